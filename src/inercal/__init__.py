@@ -62,7 +62,8 @@ Map, lower floors first; each imports only from those above its own line
     sensitivities              exact, sampled, local, dense, averages
     designs                    candidates, criteria, exchange, comparison
     imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
-    strapdown                  coefficients, kernels, samples, rests, batch, simulate, task
+    strapdown                  coefficients, kernels, samples, rests, batch, bounds, design, simulate,
+                               task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     selfcal                    platform (rig, plan, model), filters (error_state, multiplicative, quaternion,
                                gimbal, batch), before (bounds, observability, path_design,

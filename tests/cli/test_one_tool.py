@@ -40,7 +40,7 @@ READ_A_STUDY = {
         "sensitivity",
         "design positions",
     ),
-    *("design tolerances", "design selfcal", "design aoa"),
+    *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun"} | {

@@ -22,6 +22,7 @@ SIMULATE = {kind: f"simulate {kind} {kind}.toml --out out.csv" for kind in KINDS
 SENSITIVITY = "sensitivity turntable.toml"
 POSITIONS = "design positions turntable.toml"
 PATH = "design selfcal selfcal.toml"
+TURNS = "design strapdown strapdown.toml"
 
 
 @for_each(
@@ -54,6 +55,11 @@ PATH = "design selfcal selfcal.toml"
         (SENSITIVITY, "analysis.samples=10000000000000000000000000", "expected less than or equal to"),
         (POSITIONS, "design.positions=1000000000", "expected less than or equal to"),
         (POSITIONS, "design.candidates={ phi1 = 1000000, phi2 = 1000000 }", "expected at most"),
+        (TURNS, "design.turns=1000000000", "expected less than or equal to"),
+        (TURNS, "design.time=1e12 s", "a time above 0, up to 1e6 s"),
+        (TURNS, "design.time=10 s", "for 18 turns, expected 160.8 s or more"),
+        (TURNS, 'design.angles=["1e-9 deg"]', "an angle from 15 to 360 deg"),
+        (TURNS, "noise.angle_random_walk=1e-12 deg/sqrt(h)", "bounds are lost in rounding"),
         (PATH, "design.turns=1000000000", "expected less than or equal to"),
         (PATH, "design.angle=1e-9 deg", "expected at most 5000: a larger angle, or less time"),
         (PATH, "design.angle=1e-300 deg", "out of range"),

@@ -145,7 +145,7 @@ def test_a_result_is_superseded_once_with_a_reason(lab, capsys):
 WITH_RESULTS = {
     "calibrate imu", "calibrate strapdown", "calibrate turntable", "selfcal", "aoa", "allan", "temperature",
     "sensitivity", "compare", "validate",
-    *(f"design {kind}" for kind in ("positions", "tolerances", "selfcal", "aoa")),
+    *(f"design {kind}" for kind in ("positions", "tolerances", "selfcal", "strapdown", "aoa")),
 }  # fmt: skip
 
 
@@ -179,6 +179,7 @@ def test_every_result_is_kept_and_made_once_more(lab, capsys):
         [*sweep, "--instrument", "T1"],
         ["sensitivity", "turntable.toml", *small],
         ["design", "positions", "turntable.toml", *small],
+        ["design", "strapdown", "strapdown.toml"],
         ["compare", "cal.json", "cal.json"],
         ["validate"],
     ]

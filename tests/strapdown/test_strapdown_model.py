@@ -7,7 +7,7 @@ import pytest
 from grades import GRADES, MEMS, NAV, TACTICAL, drawn, plan
 
 from inercal.geometry.rotations import conjugate, exp, from_matrix, log, multiply
-from inercal.strapdown.batch import _empty_shot, _variances, fit, world_of
+from inercal.strapdown.batch import empty_shot, fit, variances_of, world_of
 from inercal.strapdown.coefficients import (
     GRAVITY,
     KA,
@@ -51,8 +51,8 @@ def run():
 
 def carried(samples, nodes, c, state):
     """The solution carried from each node to the next."""
-    shot = _empty_shot(len(nodes.sample) - 1, 6)
-    world, variances = world_of(SHORT, c, samples.ts), _variances(SHORT.noise)
+    shot = empty_shot(len(nodes.sample) - 1, 6)
+    world, variances = world_of(SHORT, c, samples.ts), variances_of(SHORT.noise)
     shoot(freed(samples, c), nodes.cuts, nodes.first, state, gains(c), world, variances, shot)
     return shot
 

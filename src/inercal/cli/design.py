@@ -86,6 +86,32 @@ def design_selfcal(
     return give(designed, output, read_s, "plan", plan, whole=(".json",))
 
 
+def design_strapdown(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+) -> int:
+    """Say what the turns of a strapdown unit tell, and find better ones."""
+    from inercal._files import write_text
+    from inercal._jit import compiling
+    from inercal.face import strapdown as system
+    from inercal.strapdown.design import study_table
+
+    output.check((".json", ".toml"), (study,))
+    the_study, read_s = study_in("strapdown", study, overrides, output)
+    with compiling("design strapdown", output.say_now):
+        system.prepare_design(the_study)
+    with reading(output, "searching") as progress:
+        designed = system.design(the_study, progress)
+
+    def plan(path: Path) -> None:
+        write_text(path, study_table(designed.evidence))
+
+    return give(designed, output, read_s, "plan", plan, whole=(".json",))
+
+
 def design_aoa(
     study: Study,
     /,

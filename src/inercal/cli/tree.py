@@ -155,6 +155,14 @@ COMMANDS = {
         "pictures.",
         "inercal design selfcal selfcal.toml --out plan.toml",
     ),
+    ("design", "strapdown"): (
+        "inercal.cli.design:design_strapdown",
+        "Say what the turns of a strapdown unit tell, and find better ones in the same time.\n\nBounds of all "
+        "coefficients before the test, after each turn; with a table [design] in the study, a search for turns and the "
+        "first attitude, beside the path of 19 positions. --out writes the turns as the table [plan] of a study "
+        "(.toml) or the whole result (.json), --report a page with pictures.",
+        "inercal design strapdown unit.toml --out plan.toml",
+    ),
     ("design", "aoa"): (
         "inercal.cli.design:design_aoa",
         "Find where the accelerometers of a wind-tunnel model tell its angle best, and how good they must be.\n\nThe "

@@ -1,16 +1,20 @@
-"""A strapdown unit in Python: calibrated from rests and coarse turns, and its simulation."""
+"""A strapdown unit in Python: calibrated from rests and coarse turns, its simulation, and the design of its test."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.face.result import Result, of_coefficients
-from inercal.face.study import Progress, Study, calibrations, with_span
+from inercal.face.result import Result, View, of_coefficients
+from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
 from inercal.records.record import Record
 from inercal.strapdown import task
+
+if TYPE_CHECKING:
+    from inercal.report.html import Picture
 
 
 def prepare(study: Study, compare: bool = False) -> None:
@@ -47,6 +51,39 @@ def calibrate(
 
     evidence = calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
     return Result(estimate, of_coefficients(shown, page), evidence)
+
+
+def prepare_design(study: Study) -> None:
+    """Load, or compile, the kernels of `design`."""
+    from inercal.strapdown.bounds import Pieces, bounds
+    from inercal.strapdown.settings import Plan
+
+    with study.at_fault():
+        bounds(Pieces(study.settings), Plan(((0, 1.0),)))
+
+
+def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
+    """Judge a plan, and search for a better one; ``evidence`` is the `inercal.strapdown.design.Designed`."""
+    from inercal.strapdown.design import REFERENCES
+    from inercal.strapdown.design import design as search
+
+    by = () if progress is None else (progress,)
+    designed, result = designed_by("design strapdown", study, lambda: search(study.settings, *by), REFERENCES)
+
+    def page() -> str:
+        from inercal.strapdown import figures
+
+        return figures.design_page(designed, result)
+
+    def picture() -> Picture:
+        from inercal.strapdown import figures
+
+        return figures.progress(designed)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+
+    return Result(result, View(result, designed.message, tables, page, picture), designed)
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:

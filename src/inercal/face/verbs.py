@@ -190,15 +190,15 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
-    """Find the positions or tolerances of a turntable, the path of a platform, or the places of a model's sensors, that
-    tell most.
+    """Find the positions or tolerances of a turntable, the path of a platform, the turns of a strapdown unit, or the
+    places of a model's sensors, that tell most.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
-        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"aoa"`` of a model, as the
-        commands name it; if absent, by the kind, positions.
+        ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"strapdown"`` of a strapdown
+        unit, ``"aoa"`` of a model, as the commands name it; if absent, by the kind, positions.
 
     Returns
     -------
@@ -219,14 +219,16 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     12
     """
     study = study_of(study)
-    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal", "aoa": "aoa"}
+    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal", "strapdown": "strapdown",
+             "aoa": "aoa"}  # fmt: skip
     if what is not None and kinds.get(what) != study.kind:
         raise InputError(
             "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
         )
     if study.kind not in kinds.values():
         raise InputError(
-            "design", f"found a study of kind {study.kind}, expected one of turntable, selfcal or aoa"
+            "design",
+            f"found a study of kind {study.kind}, expected one of turntable, selfcal, strapdown or aoa",
         )
     system = import_module(f"inercal.face.{study.kind}")
     if study.kind != "turntable":
@@ -237,9 +239,8 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
 
 def _designs(kind: str) -> str:
     """The designs of a kind, in words."""
-    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'", "aoa": "'aoa'"}.get(
-        kind, "a study of kind turntable, selfcal or aoa"
-    )
+    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'", "strapdown": "'strapdown'",
+            "aoa": "'aoa'"}.get(kind, "a study of kind turntable, selfcal, strapdown or aoa")  # fmt: skip
 
 
 def sensitivity(study: Study | str | Path) -> Result:

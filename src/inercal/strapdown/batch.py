@@ -22,7 +22,7 @@ from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples, freed, gains
 from inercal.strapdown.settings import Noise, StrapdownSettings
-from inercal.strapdown.start import Beginning, beginning, carried_through, first_coefficients
+from inercal.strapdown.start import beginning, carried_through, first_coefficients
 
 
 @short_repr
@@ -60,7 +60,7 @@ def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
     return World(earth, settings.site.gravity + float(c[GRAVITY]), ts)
 
 
-def _variances(noise: Noise) -> Array:
+def variances_of(noise: Noise) -> Array:
     """Variances (4,) [per s] of attitude, velocity, and the biases of gyros and accelerometers, of which one that does
     not walk beside one that does is given so little that it does not matter."""
     white = np.array([noise.angle_random_walk, noise.velocity_random_walk])
@@ -68,7 +68,7 @@ def _variances(noise: Noise) -> Array:
     return np.asarray(np.square(np.concatenate([white, np.maximum(walks, 1e-5 * white)])))
 
 
-def _empty_shot(count: int, m: int) -> Shot:
+def empty_shot(count: int, m: int) -> Shot:
     """Room for a solution of so many intervals with ``m`` errors each."""
     return Shot(
         np.empty((count, 4)),
@@ -92,7 +92,7 @@ def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit | No
 def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     """The fit; raises `numpy.linalg.LinAlgError` where a matrix is singular or no matrix of numbers."""
     noise, m = settings.noise, 12 if settings.noise.walks else 6
-    variances = _variances(noise)
+    variances = variances_of(noise)
     deviations = settings.deviations()
     free = free_places(settings.terms, settings.gravity_u > 0.0, settings.site.latitude_u > 0.0)
     prior, c = deviations[free], first_coefficients(samples, nodes)
@@ -100,7 +100,7 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     begin = beginning(motion, nodes, settings)
     q = carried_through(motion, nodes, begin)
     count = len(nodes.sample)
-    v, bias, shot = np.zeros((count, 3)), np.zeros((count, 6)), _empty_shot(count - 1, m)
+    v, bias, shot = np.zeros((count, 3)), np.zeros((count, 6)), empty_shot(count - 1, m)
     reference = q[np.unique(nodes.rest, return_index=True)[1]][nodes.rest]
     n = 2 * m + 3 + len(free)
     H, g = np.empty((n, n)), np.empty(n)
@@ -126,14 +126,14 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
             settings.rests.velocity**-2,
             log(multiply(q, conjugate(reference))),
             0.0 if held is None else held**-2,
-            _start_information(begin, variances, m),
+            start_information(begin.u, variances, m),
             np.concatenate([log(multiply(q[0], conjugate(begin.q_nb))), v[0], bias[0]])[:m],
             prior**-2,
             c[free].copy(),
         )
         forward(chain, H, g, rows, right)
         information = _information(H, len(free))
-        covariance = _inverse(information, prior)
+        covariance = inverse(information, prior)
         step = covariance @ g[-len(free) :]
         backward(nodes.rest, rows, right, step, x, angles)
         passes += 1
@@ -202,11 +202,11 @@ def _wide(G: Array, m: int) -> Array:
     return np.ascontiguousarray(np.pad(G, ((0, 0), (0, m - 6), (0, 0))))
 
 
-def _start_information(begin: Beginning, variances: Array, m: int) -> Array:
-    """Information (m,) of the state of the first node: of its attitude, none of its velocity; biases do not deviate
-    there."""
+def start_information(u: Array, variances: Array, m: int) -> Array:
+    """Information (m,) of the state of the first node, its attitude known to ``u`` (3,) [rad], its velocity not at all;
+    biases do not deviate there."""
     held = 1e6 / np.repeat(variances[2:], 3)
-    return np.concatenate([begin.u**-2, np.zeros(3), held])[:m]
+    return np.concatenate([u**-2, np.zeros(3), held])[:m]
 
 
 def covariance_of(chain: Chain, prior: Array) -> Array:
@@ -215,14 +215,14 @@ def covariance_of(chain: Chain, prior: Array) -> Array:
     n, count = 2 * m + 3 + p, len(chain.rest)
     H = np.empty((n, n))
     forward(chain, H, np.empty(n), np.empty((count, m + 3, n)), np.empty((count, m + 3)))
-    return _inverse(_information(H, p), prior)
+    return inverse(_information(H, p), prior)
 
 
 def interval_noise(fit: Fit, samples: Samples, settings: StrapdownSettings, more: Array) -> Array:
     """Information (k, m, m) of the intervals of a fit, the variances of sensor noise and walks times ``more`` (4,)."""
     m, count = fit.chain.F.shape[1], len(fit.nodes.sample)
-    shot, state = _empty_shot(count - 1, m), State(fit.q_nb, fit.velocity, np.zeros((count, 6)))
-    variances, world = _variances(settings.noise) * more, world_of(settings, fit.c, samples.ts)
+    shot, state = empty_shot(count - 1, m), State(fit.q_nb, fit.velocity, np.zeros((count, 6)))
+    variances, world = variances_of(settings.noise) * more, world_of(settings, fit.c, samples.ts)
     shoot(freed(samples, fit.c), fit.nodes.cuts, fit.nodes.first, state, gains(fit.c), world, variances, shot)
     return np.asarray(np.linalg.inv(shot.Q))
 
@@ -233,7 +233,7 @@ def _information(H: Array, p: int) -> Array:
     return np.asarray(upper + np.triu(upper, 1).T)
 
 
-def _inverse(information: Array, prior: Array) -> Array:
+def inverse(information: Array, prior: Array) -> Array:
     """Inverse (p, p) of an information matrix, by Cholesky in units of the prior."""
     scaled = information * np.outer(prior, prior)
     root = np.linalg.inv(np.linalg.cholesky(scaled))

@@ -8,11 +8,13 @@ import numpy as np
 
 from inercal.report.coefficients import budget, correlation, values
 from inercal.report.html import Picture, render
-from inercal.report.marks import Axis, Bars, Level, Line, Mark, Panel, Strips
+from inercal.report.marks import Axis, Bars, Level, Line, Mark, Panel, Strips, Style
 from inercal.report.panels import draw
 from inercal.report.style import ALARM, COLOURS, envelope
 
 if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
+    from inercal.strapdown.design import Designed
     from inercal.strapdown.task import StrapdownCalibration
 
 
@@ -75,3 +77,27 @@ def _rests(calibration: StrapdownCalibration) -> Picture:
         [[Panel(marks, Axis("time [s]", margin=0.005), Axis("rate [deg/s]"))]],
         1.9,
     )
+
+
+def progress(designed: Designed) -> Picture:
+    """Largest u of each kind of coefficient, over its goal, after each rest of a plan."""
+    from inercal.strapdown.design import by_kind
+
+    marks: list[Mark] = [Level(1.0, "goal", ALARM, 0.9)]
+    for k, (kind, ratio) in enumerate(by_kind(designed).items()):
+        style: Style = "-" if k < len(COLOURS) else "--"
+        marks.append(
+            Line(np.arange(len(ratio)), ratio, kind.replace("_", " "), COLOURS[k % len(COLOURS)], 1.0, style)
+        )
+    return draw(
+        "What the turns tell",
+        "Largest standard uncertainty of each kind of coefficient, over its goal, after each turn and the rest that "
+        "follows: the best that any estimator can reach.",
+        [[Panel(marks, Axis("turn", whole=True, margin=0.02), Axis("u / goal", "log"), legend="beside")]],
+        3.0,
+    )
+
+
+def design_page(designed: Designed, estimate: Estimate) -> str:
+    """The report of a design as one self-contained HTML page."""
+    return render(estimate, [progress(designed)], "Turns of a strapdown unit", (), designed.tables())

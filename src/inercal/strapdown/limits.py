@@ -74,5 +74,14 @@ class Limits:
     far_from_prior: float = 4.0
     """Distance of a value from what is expected, over the standard deviation of its prior, at which that is doubted."""
 
+    largest_part: float = 0.3
+    """Part of the largest ratio of u to its goal in the criterion of a path, beside their geometric mean."""
+
+    path_starts: int = 5
+    """Random paths that the search for a path begins with."""
+
+    told: float = 1.1
+    """Factor by which a turn lowers the u of a coefficient that it is said to tell."""
+
 
 LIMITS = Limits()

@@ -24,7 +24,7 @@ from inercal.strapdown.budget import sources
 from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
 from inercal.strapdown.left_out import Tested, tests
 from inercal.strapdown.limits import LIMITS
-from inercal.strapdown.samples import Samples
+from inercal.strapdown.samples import Samples, freed
 from inercal.strapdown.settings import StrapdownSettings
 
 COMMAND = "calibrate strapdown"
@@ -106,7 +106,7 @@ def assemble(
         "intervals": float(len(rests)),
     }
     return Estimate.of(
-        _basis(record, settings, _conditions(record, samples, settings)),
+        _basis(record, settings, _conditions(record, samples, fit, settings)),
         found,
         [_unit(name, record) for name in found],
         values,
@@ -206,10 +206,11 @@ def _nuisances(fit: Fit) -> dict[str, dict[str, float]]:
     }
 
 
-def _conditions(record: Record, samples: Samples, settings: StrapdownSettings) -> dict[str, Any]:
-    """Conditions and ranges over which the result is valid."""
+def _conditions(record: Record, samples: Samples, fit: Fit, settings: StrapdownSettings) -> dict[str, Any]:
+    """Conditions and ranges over which the result is valid; rates are those of the unit, about x, y, z of b."""
+    rate = freed(samples, fit.c).w
     ranges = {
-        "rate_about_an_axis_rad_s": [samples.rate.min(axis=0), samples.rate.max(axis=0)],
+        "rate_about_an_axis_rad_s": [rate.min(axis=0).tolist(), rate.max(axis=0).tolist()],
         "specific_force_along_an_axis_m_s2": [float(samples.force.min()), float(samples.force.max())],
         "duration_s": len(samples.rate) * samples.ts,
         "rate_hz": 1.0 / samples.ts,

@@ -20,6 +20,7 @@ from inercal.keys import (
     Bounds,
     above_zero,
     option,
+    quantities,
     quantity,
     within,
 )
@@ -111,6 +112,61 @@ class Prior:
 
 
 @dataclass(frozen=True)
+class Goal:
+    """Wanted standard uncertainties, for `inercal design strapdown`; None without a wish."""
+
+    gyro_bias: float | None = quantity("of gyro biases", "rate", example="0.003 deg/h", bounds=DEVIATION)
+    scale: float | None = quantity("of scale factors of gyros", "number", example="1 ppm", bounds=DEVIATION)
+    misalignment: float | None = quantity(
+        "of misalignments of gyros", "angle", example="0.3 arcsec", bounds=DEVIATION
+    )
+    bias: float | None = quantity("of accelerometer biases", "acceleration", example="1 ug", bounds=DEVIATION)
+    k1: float | None = quantity(
+        "of scale factors of accelerometers", "number", example="1 ppm", bounds=DEVIATION
+    )
+    axes: float | None = quantity(
+        "of misalignments of accelerometers", "angle", example="0.3 arcsec", bounds=DEVIATION
+    )
+    k2: float | None = quantity(
+        "of second-order coefficients", "quadratic", example="1 ug/g^2", bounds=DEVIATION
+    )
+    size: float | None = quantity(
+        "of the places of accelerometers x and y", "length", example="0.5 mm", bounds=DEVIATION
+    )
+    delay: float | None = quantity(
+        "of the delay of the accelerometers", "time", example="0.01 ms", bounds=DEVIATION
+    )
+    asymmetry: float | None = quantity(
+        "of half the differences of scale factors for positive and negative rates", "number", example="1 ppm",
+        bounds=DEVIATION,
+    )  # fmt: skip
+    g_sensitivity: float | None = quantity(
+        "of drifts by specific force", "rate by force", example="0.02 deg/h/g", bounds=DEVIATION
+    )
+
+
+@dataclass(frozen=True)
+class Design:
+    """The search for a path, for `inercal design strapdown`."""
+
+    turns: int = option("number of turns", 18, least=1, most=40)
+    angles: tuple[float, ...] = quantities(
+        "by which a turn goes, either way", "angle", example=["90 deg", "180 deg"],
+        bounds=Bounds(lambda angle: math.radians(15.0) <= angle <= 2.0 * math.pi, "an angle from 15 to 360 deg"),
+    )  # fmt: skip
+    time: float | None = quantity(
+        "of the whole test, in which rests last as long as the turns leave; if absent, as long as rests of the plan's "
+        "dwell with turns by the smallest angle take", "time", example="10 min",
+        bounds=Bounds(lambda time: 0.0 < time <= 1e6, "a time above 0, up to 1e6 s"),
+    )  # fmt: skip
+    start: Literal["free", "plan"] = option(
+        "attitude of the first rest: free, a multiple of quarter turns from that of the plan, or that of the plan",
+        "free",
+    )
+    seed: int = option("of the random starts", 1, least=0)
+
+
+@dataclass(frozen=True)
 class Start:
     """Attitude at the first rest: its ``heading`` [rad] with standard uncertainty; where it is None by the gyrocompass
     or not, None as the prior of the gyro bias has it."""
@@ -134,8 +190,12 @@ class Plan:
     @property
     def duration(self) -> float:
         """Time [s] of all rests and turns."""
-        angles = sum(abs(angle) for _, angle in self.turns)
-        return self.first_dwell + self.turn_time * angles / (0.5 * math.pi) + self.dwell * len(self.turns)
+        turning = sum(self.time_of(angle) for _, angle in self.turns)
+        return self.first_dwell + turning + self.dwell * len(self.turns)
+
+    def time_of(self, angle: float) -> float:
+        """Time [s] of a turn by ``angle`` [rad]."""
+        return self.turn_time * abs(angle) / (0.5 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -171,7 +231,9 @@ class StrapdownSettings:
     rests: Rests = field(default_factory=Rests)
     start: Start = field(default_factory=Start)
     prior: Prior = field(default_factory=Prior)
+    goal: Goal = field(default_factory=Goal)
     plan: Plan | None = None
+    design: Design | None = None
     motion: Motion = field(default_factory=Motion)
     truth: Mapping[str, float] = field(default_factory=dict)
     traceability: Mapping[str, str] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import Motion, Noise, Plan, StrapdownSettings
 from inercal.units import parse_unit
 
-_AXES: Final[tuple[Axis, Axis, Axis]] = ("x", "y", "z")
+AXES: Final[tuple[Axis, Axis, Axis]] = ("x", "y", "z")
 _ORDER: Final[tuple[Axis, Axis, Axis]] = ("z", "x", "y")
 
 _POINTS, _WEIGHTS = (each / 2.0 for each in np.polynomial.legendre.leggauss(5))
@@ -40,7 +40,7 @@ class Truth:
     C_nb: Array
 
 
-class _Turn(NamedTuple):
+class Turn(NamedTuple):
     """A turn from ``begin`` [s], lasting ``time``, from ``C_nb`` (3, 3) about ``axis`` by ``angle``, along ``path``."""
 
     begin: float
@@ -51,14 +51,14 @@ class _Turn(NamedTuple):
     path: Array
 
 
-def _turns(plan: Plan, motion: Motion, rng: np.random.Generator) -> Iterator[_Turn]:
+def _turns(plan: Plan, motion: Motion, rng: np.random.Generator) -> Iterator[Turn]:
     """The turns of a plan, one after the other; each goes along a way of random direction."""
     C, begin = start_attitude(plan), plan.first_dwell
     for axis, angle in plan.turns:
-        time = plan.turn_time * abs(angle) / (0.5 * np.pi)
+        time = plan.time_of(angle)
         direction = rng.standard_normal(3)
-        yield _Turn(begin, time, C, axis, angle, motion.translation * direction / np.linalg.norm(direction))
-        C = np.asarray(C @ elementary(_AXES[axis], angle))
+        yield Turn(begin, time, C, axis, angle, motion.translation * direction / np.linalg.norm(direction))
+        C = np.asarray(C @ elementary(AXES[axis], angle))
         begin += time + plan.dwell
 
 
@@ -81,7 +81,7 @@ def _bump(s: Array, size: float, rate: float, time: float) -> tuple[Array, Array
     return size * a * b, size * (da * b + a * db), size * (dda * b + 2.0 * da * db + a * ddb)
 
 
-def truth(turn: _Turn, t: Array, motion: Motion, earth: Array, gravity: float) -> Truth:
+def truth(turn: Turn, t: Array, motion: Motion, earth: Array, gravity: float) -> Truth:
     """Motion that the sensors meet at times (n,) within a turn, or before or after it."""
     s = np.clip((t - turn.begin) / turn.time, 0.0, 1.0)
     two_pi = 2.0 * np.pi
@@ -96,7 +96,7 @@ def truth(turn: _Turn, t: Array, motion: Motion, earth: Array, gravity: float) -
     C = np.broadcast_to(turn.C_nb, (len(t), 3, 3))
     w, wd = np.zeros((len(t), 3)), np.zeros((len(t), 3))
     for axis, (angle, first, second) in zip([turn.axis, *others], [main, *swings], strict=True):
-        step, unit = elementary(_AXES[axis], angle), np.eye(3)[axis]
+        step, unit = elementary(AXES[axis], angle), np.eye(3)[axis]
         w, wd = np.einsum("nji,nj->ni", step, w), np.einsum("nji,nj->ni", step, wd)
         wd = wd - np.cross(first[:, None] * unit, w) + second[:, None] * unit
         w = w + first[:, None] * unit
@@ -122,7 +122,7 @@ class _Means(NamedTuple):
     C_nb: Array
 
 
-def _means(turn: _Turn, stamps: Array, settings: StrapdownSettings, c: Array, ts: float) -> _Means:
+def _means(turn: Turn, stamps: Array, settings: StrapdownSettings, c: Array, ts: float) -> _Means:
     """Means over the samples that end at ``stamps`` (n,)."""
     latitude = settings.latitude
     earth = EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])
@@ -145,10 +145,9 @@ def simulated(settings: StrapdownSettings, c: Array, rng: np.random.Generator, n
     """Outputs of a unit with the coefficients ``c`` (51,) that rests and turns as planned; ``noise`` of sensors and
     stand as the study states it, or none."""
     plan = settings.plan
-    if plan is None:
-        raise StudyError(
-            "plan", 'missing, expected turns, such as turns = [["y", "90 deg"], ["z", "90 deg"]]'
-        )
+    if plan is None or not plan.turns:
+        where = "plan" if plan is None else "plan.turns"
+        raise StudyError(where, 'missing, expected turns, such as turns = [["y", "90 deg"], ["z", "90 deg"]]')
     ts, turns = 1.0 / plan.sample_rate, list(_turns(plan, settings.motion, rng))
     last = turns[-1]
     count = round((last.begin + last.time + plan.dwell) / ts)

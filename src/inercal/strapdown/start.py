@@ -30,23 +30,32 @@ def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Begi
     last = nodes.sample[np.flatnonzero(nodes.rest == 0)[-1]]
     force, rate = (np.mean(x[nodes.sample[0] : last], axis=0) for x in (motion.f, motion.w))
     up = force / np.linalg.norm(force)
-    start = settings.start
-    compass = start.compass
-    if compass is None:
-        compass = start.heading is None and settings.prior.gyro_bias < EARTH_RATE * np.cos(settings.latitude)
-    tilt = LIMITS.start_tilt
-    east = np.cross(rate, up)
-    if compass and np.linalg.norm(east) > 0.0:
+    u, east = start_u(settings), np.cross(rate, up)
+    if by_compass(settings) and np.linalg.norm(east) > 0.0:
         east /= np.linalg.norm(east)
-        u = np.array([tilt, tilt, LIMITS.start_heading])
         return Beginning(from_matrix(np.stack([east, np.cross(up, east), up])), u)
     # the axis of b that is nearest to level points north, then turned by the heading
     axis = np.eye(3)[int(np.argmin(np.abs(up)))]
     north = axis - (axis @ up) * up
     north /= np.linalg.norm(north)
     level = from_matrix(np.stack([np.cross(north, up), north, up]))
-    heading = np.array([0.0, 0.0, -(start.heading or 0.0)])
-    return Beginning(multiply(exp(heading), level), np.array([tilt, tilt, start.heading_u]))
+    heading = np.array([0.0, 0.0, -(settings.start.heading or 0.0)])
+    return Beginning(multiply(exp(heading), level), u)
+
+
+def by_compass(settings: StrapdownSettings) -> bool:
+    """True where the heading at the start is found from earth rate."""
+    compass = settings.start.compass
+    if compass is None:
+        earth = EARTH_RATE * np.cos(settings.latitude)
+        return settings.start.heading is None and bool(settings.prior.gyro_bias < earth)
+    return compass
+
+
+def start_u(settings: StrapdownSettings) -> Array:
+    """Standard deviations (3,) [rad] of the attitude at the start about east, north, up."""
+    tilt, start = LIMITS.start_tilt, settings.start
+    return np.array([tilt, tilt, LIMITS.start_heading if by_compass(settings) else start.heading_u])
 
 
 def first_coefficients(samples: Samples, nodes: Nodes) -> Array:

@@ -15,6 +15,8 @@ from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.strapdown.coefficients import OPTIONS, names
 from inercal.strapdown.settings import (
+    Design,
+    Goal,
     Motion,
     Noise,
     Plan,
@@ -158,7 +160,7 @@ class RestsTable(table_of(Rests)):  # type: ignore[misc]
 
 
 class PlanTable(table_of(Plan)):  # type: ignore[misc]
-    """The plan of a simulated recording."""
+    """The plan of a test, or of a simulated recording."""
 
     start: Annotated[Several, SeveralTexts(ExactText("angle", "0 deg"), "pitch, roll, yaw")] | None = Field(
         default=None,
@@ -166,15 +168,16 @@ class PlanTable(table_of(Plan)):  # type: ignore[misc]
         description="attitude of the first rest: from x east, y north, z up turned about z by yaw, then about x by "
         "pitch, then about y by roll; pitch, roll, yaw, 0 if absent",
     )
-    turns: list[Annotated[TypedTurn, TurnTexts()]] = Field(
+    turns: list[Annotated[TypedTurn, TurnTexts()]] | None = Field(
+        default=None,
         min_length=1,
         examples=[[["y", "90 deg"], ["-z", "90 deg"]]],
-        description="turns of the unit, consecutively: axis and angle",
+        description="turns of the unit, consecutively: axis and angle; only a search for them does without",
     )
 
 
 class StrapdownStudyFile(Strict):
-    """A study of a strapdown unit, for `inercal calibrate strapdown` and `simulate strapdown`."""
+    """A study of a strapdown unit, for `inercal design strapdown`, `simulate strapdown` and `calibrate strapdown`."""
 
     version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the unit stands")
@@ -183,8 +186,14 @@ class StrapdownStudyFile(Strict):
     rests: RestsTable = Field(default=RestsTable(), title="Rests", description="rests between the turns")
     start: StartTable = Field(default=StartTable(), title="Start", description="attitude at the first rest")
     prior: Stated[Prior] = Field(default=Prior(), title="Prior", description="what is known before the test")
+    goal: Stated[Goal] = Field(default=Goal(), title="Goal", description="wanted standard uncertainties")
     plan: PlanTable | None = Field(
-        default=None, title="Plan", description="the plan of a simulated recording"
+        default=None, title="Plan", description="the plan of a test, or of a simulated recording"
+    )
+    design: Stated[Design] | None = Field(
+        default=None,
+        title="Design",
+        description="the search for a path; without this table the plan is judged alone",
     )
     truth: dict[str, Typed] = Field(
         default_factory=dict,
@@ -226,6 +235,8 @@ def strapdown_study(data: Mapping[str, Any], path: str | Path) -> StrapdownSetti
         ),
         start=_start(file.start),
         prior=file.prior,
+        goal=file.goal,
+        design=file.design,
         plan=None if file.plan is None else _plan(file.plan, path),
         motion=file.motion,
         truth=truth,
@@ -257,7 +268,7 @@ def _start(table: StartTable) -> Start:
 def _plan(table: Any, path: str | Path) -> Plan:
     """The plan; refused where it has too many samples, or too few for its turns."""
     start = (0.0, 0.0, 0.0) if table.start is None else table.start.values
-    plan = settings_of(Plan, table, start=start, turns=tuple(each.turn for each in table.turns))
+    plan = settings_of(Plan, table, start=start, turns=tuple(each.turn for each in table.turns or ()))
     rows = plan.duration * plan.sample_rate
     if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise StudyError(path, f"plan: found {rows:.4g} samples, expected {FEWEST_ROWS} to {MOST_ROWS:.0e}")
