@@ -9,11 +9,12 @@ from sting_study import NOISE, study
 
 from inercal.aoa.band import Band
 from inercal.aoa.diagnosis.choice import decided, of_rectification, of_vibration
+from inercal.aoa.diagnosis.unseen import unseen_scale
 from inercal.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.recording import plain
 from inercal.aoa.result.verification import late_reference
-from inercal.aoa.settings import Estimator
+from inercal.aoa.settings import Estimator, Prior
 from inercal.stream.aoa_state import choice_of, chosen
 
 SEEDS = 6
@@ -193,3 +194,23 @@ def test_in_vibration_the_angle_is_good_and_u_is_its_size(kind, smoothed):
             assert np.sqrt(np.mean(error**2)) < 0.05 * DEG, (name, seed)
             ratios.append(np.mean(np.square(error / filtered.u[late])))
     assert np.sqrt(np.mean(ratios)) < 1.4
+
+
+def test_a_scale_of_the_gyro_that_no_reading_shows_is_told_with_what_it_costs():
+    """Under one sine: as much as the angle is off by where it is so; not at rest, nor where the prior allows for it."""
+    run = simulate(Tunnel(duration=15.0), 3)
+    recording, of = plain(run.t, run.acc, run.gyro), problem(study())
+    (said,) = unseen_scale(recording, of)
+    quoted = float(said.message.split("shifts the angle by ")[1].split(" deg")[0])
+    late = run.t > 2.0
+    off, right = (
+        (estimate(each, of).theta - run.theta)[late] / DEG
+        for each in (replace(recording, gyro=1.01 * run.gyro), recording)
+    )
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(quoted, abs=2.0 * np.sqrt(np.mean(right**2)))
+    assert said.harm == ()
+    wide = replace(study(), prior=Prior(gyro_scale=0.02))
+    assert unseen_scale(recording, problem(wide)) == []
+    rest = simulate(Tunnel("rest", duration=15.0), 3)
+    assert unseen_scale(plain(rest.t, rest.acc, rest.gyro), of) == []
+    assert unseen_scale(replace(recording, gyro=np.full_like(run.gyro, np.nan)), of) == []

@@ -145,3 +145,38 @@ def test_results_as_files_need_no_store(tmp_path, monkeypatch, capsys):
     assert run(["history", *(f"{k}.json" for k in range(4))]) == 0
     assert "K1_x" in capsys.readouterr().out
     assert ic.history(*(f"{k}.json" for k in range(4))).status is Status.OK
+
+
+def test_tolerances_of_the_last_study_count_where_no_others_are_given(tmp_path):
+    """`[specification]` of the study is kept with the result; in the store as in files."""
+    made = aged(tmp_path / "store", count=3)
+    stated = result(50, NAMES, "2022-01-01", [1.0, 1.0, 0.0], 3e-6)
+    settings = {"specification": {"K1": ["0.999 1", "1.001 1"]}}
+    stated = replace(stated, provenance={**stated.provenance, "settings": settings})
+    keep(made, stated, Item("Maker", "G1", "17"))
+    save(stated, tmp_path / "last.json")
+    for of, more in ((("17",), {"store": made.where}), ((tmp_path / "last.json",), {})):
+        found = ic.history(*of, **more).evidence
+        judged = {course.name: course.conformity for course in found.courses}
+        assert judged["K1_x"].verdict == "conform"
+        assert judged["K0_x"] is None
+
+
+def test_five_units_of_one_make_have_histories_of_their_own(tmp_path):
+    """Five units whose K1 age differently, in one store: each drift is its own, within 3 sigma of U / 2."""
+    store = make_store(str(tmp_path / "store"))
+    rng = np.random.default_rng(12)
+    ageing = np.array([-10e-6, -5e-6, 0.0, 5e-6, 10e-6])
+    for unit, rate in enumerate(ageing):
+        for k in range(10):
+            day = BEGIN + timedelta(days=182 * k)
+            value = 1.0 + rate * (day - BEGIN).days / 365.25 + 3e-6 * rng.normal()
+            keep(
+                store,
+                result(100 * unit + k, ("K1_x",), day.isoformat(), [value], 3e-6),
+                Item("M", "G1", str(unit)),
+            )
+    for unit, rate in enumerate(ageing):
+        (course,) = history(values_of(store, str(unit)), str(unit)).courses
+        drift = course.wandering.drift
+        assert abs(drift.value - rate) < 1.5 * drift.U

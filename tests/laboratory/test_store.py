@@ -19,6 +19,7 @@ from made import ITEM, result
 from sqlalchemy import text
 
 from inercal.errors import InputError
+from inercal.estimate.files import to_json
 from inercal.inputs import Source
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import find, instruments, results, show, values_of
@@ -89,6 +90,22 @@ def test_the_same_result_twice_adds_nothing(store):
     assert check(store).events == 2  # init and keep
     assert keep(store, result(2), ITEM).new
     assert [row["results"] for row in instruments(store)] == [2]
+
+
+def test_a_result_of_another_version_is_kept_as_it_is(store):
+    """Its version and keys are those of the file, and so is its identity, whichever program keeps it."""
+    given = result(1)
+    saved = {key: value for key, value in to_json(given).items() if key != "findings"} | {
+        "inercal": "0.0.7",
+        "own": 1,
+    }
+    first = keep(store, given, ITEM, saved=saved)
+    assert show(store, first.id).listed.version == "0.0.7"
+    data = json.loads(store.objects.read(show(store, first.id).object))
+    assert data["own"] == 1
+    assert not keep(store, given, ITEM, saved=data).new
+    assert keep(store, given, ITEM).new
+    assert check(store).faults == ()
 
 
 def test_rows_cannot_be_changed_or_deleted(store, tmp_path):
@@ -213,7 +230,7 @@ def test_a_file_that_was_changed_is_refused_at_once_and_noted_later(store, tmp_p
     with pytest.raises(InputError, match="was changed"):
         keep(store, given, ITEM)
     assert results(store) == []
-    done = keep(store, given, ITEM, made_here=False)
+    done = keep(store, given, ITEM, saved=to_json(given))
     assert "kept by its checksum alone" in done.notes[0]
     assert check(store).faults == ()
 

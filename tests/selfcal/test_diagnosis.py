@@ -153,7 +153,9 @@ def test_two_faults_at_once_are_both_named():
 def test_an_unmodelled_turn_of_the_base():
     truth = TRUTH.copy()
     truth[21:] = 5.0 * ARCSEC
-    found = only(named(recording(truth=truth)), "unmodelled", "beta_x = 5", "beta_z = ", "extended = true")
+    found = only(
+        named(recording(truth=truth)), "unmodelled", "beta_x = 5", "beta_z = ", 'states = "extended"'
+    )
     assert "kg1" not in found.message
 
 

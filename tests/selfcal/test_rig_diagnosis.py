@@ -7,10 +7,11 @@ import pytest
 from independent import selfcal as platform
 from independent.selfcal import ARCSEC, DEG_H, PPM, THREE, UG, Drive, Faults, G
 
+import inercal as ic
 from inercal.estimate.hypotheses import slopes
 from inercal.records.read import read
 from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.diagnosis.fit_quality import JUDGE
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, filtered
 from inercal.selfcal.diagnosis.rig_errors import rig_errors
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
@@ -39,7 +40,7 @@ def test_columns_of_innovations_are_differences(settings, tmp_path):
     """Each hypothesis of the rig: its derivative, and the innovations of the filter run again with it taken out."""
     case = (recorded(settings, tmp_path, Faults(warming=2.0)), problem(settings))
     z = JUDGE.residuals(case)
-    for each in rig_errors(case):
+    for each in rig_errors(case, filtered(case)):
         exact = slopes(case, each, z, JUDGE)
         for k in range(0, len(each.parameters), 4):
             size = 1e-3 / np.nanmax(np.abs(exact[..., k]))
@@ -74,10 +75,11 @@ NAMED = {
     "delay_gyro": (Faults(delay_gyro=1e-3), "later than its commands"),
     "warm": (Faults(warming=1.0, bias_by_k=np.array([10.0, -10.0, 10.0]) * UG), "temperature"),
     "flicker": (Faults(flicker=2 * UG), "wander"),
+    "sway": (Faults(sway=2 * ARCSEC), "swing with 0.3 Hz, by some 1.8 arcsec: where the base sways"),
 }
 
 
-QUICK = ("gamma", "flicker")
+QUICK = ("gamma", "flicker", "sway")
 """Of the standard tests; all of them are a campaign."""
 
 
@@ -90,3 +92,16 @@ def test_each_is_named(fault, settings, tmp_path):
     made, of = recorded(settings, tmp_path, faults), problem(settings)
     found = diagnose(made, of, estimate(made, of, history=False))
     assert [words in each.message for each in found] == [True], [each.message for each in found]
+
+
+@pytest.mark.parametrize("size", [0.5, 2.0])
+def test_sway_that_is_stated_is_noise(size, tmp_path):
+    """With 2 arcsec at 0.3 Hz beside the same of encoder noise the verdict is ok, and no value is beyond 4 u."""
+    platform.simulated(np.random.default_rng([20261123, 5]), DRIVE, faults=Faults(sway=size * ARCSEC)).write(
+        tmp_path / "record.csv"
+    )
+    study = platform.study().replace("[noise]", f'[noise]\nbase_sway = "{size} arcsec"')
+    (tmp_path / "study.toml").write_text(study)
+    found = ic.calibrate(read([tmp_path / "record.csv"]), tmp_path / "study.toml").estimate
+    assert found.status.value == "ok"
+    assert np.abs((found.values[:18] - platform.TRUTH) / found.u[:18]).max() < 4.0

@@ -322,17 +322,24 @@ def test_estimators_agree_on_a_rig_with_all_errors(kind):
 
 
 @pytest.mark.slow
-def test_uncertainties_of_rig_states_hold():
-    """NEES of the states over 12 draws from their priors, within limits that 1 in 10000 leaves."""
+@pytest.mark.parametrize("draws", [12, pytest.param(100, marks=pytest.mark.campaign)])
+def test_uncertainties_of_rig_states_hold(draws):
+    """NEES of the states over draws from their priors, within limits that 1 in 10000 leaves; of each state the mean of
+    squared errors over u^2, within limits that 1 in 10000 leaves of all."""
     settings = replace(BASE, model=Model(RIG))
     posed, rng, total = problem(settings), np.random.default_rng(13), 0.0
-    for _ in range(12):
+    squares = np.zeros(len(posed.names))
+    for _ in range(draws):
         c = drawn(settings, rng, RIG)
         found = estimate(recorded(settings, c, rng), posed, "error-state", history=False)
         error = found.coefficients - c[posed.states.index]
         total += error @ np.linalg.solve(found.covariance, error)
-    low, high = chi2.ppf([5e-5, 1 - 5e-5], 12 * len(posed.names))
+        squares += error**2 / np.diag(found.covariance)
+    low, high = chi2.ppf([5e-5, 1 - 5e-5], draws * len(posed.names))
     assert low < total < high
+    least, most = chi2.ppf([5e-5 / len(squares), 1 - 5e-5 / len(squares)], draws)
+    assert least < squares.min()
+    assert squares.max() < most
 
 
 def test_sensitivities_are_those_of_the_filter_run_again():

@@ -199,7 +199,9 @@ def test_filter_disturbances_and_design():
             "integration": "euler",
         },
         disturbances={
-            "dropouts": "1 %", "command_delay": "0.2 s",
+            "dropouts": "1 %", "command_delay": "0.2 s", "flicker": "1 ug", "gyro_flicker": "0.001 deg/h",
+            "servo_jitter": "1 deg/h", "stamp_jitter": "0.1 ms", "quantisation": "1 arcsec", "lost_rows": "2 %",
+            "base_sway": {"amplitude": "2 arcsec", "frequency": "0.3 Hz"},
             "harmonics": [{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "90 deg"},
                           {"axis": "x", "order": 1, "amplitude": "1 arcsec"}],
         },
@@ -215,6 +217,12 @@ def test_filter_disturbances_and_design():
     harmonics = [(2, 2, 5 * ARCSEC, math.pi / 2), (0, 1, ARCSEC, 0.0)]
     assert_allclose(found.disturbances.harmonics, harmonics)
     assert (found.disturbances.dropouts, found.disturbances.command_delay) == (0.01, 0.2)
+    other = found.disturbances
+    assert_allclose(
+        [other.flicker, other.gyro_flicker, other.servo_jitter, other.quantisation, *other.base_sway],
+        [MICRO_G, 0.001 * PER_HOUR, PER_HOUR, ARCSEC, 2 * ARCSEC, 0.3],
+    )
+    assert (other.stamp_jitter, other.lost_rows) == (pytest.approx(1e-4), pytest.approx(0.02))
     assert (found.search.turns, found.search.time, found.search.criterion, found.search.seed) == (
         4,
         600.0,

@@ -348,6 +348,12 @@ class Limits:
     nis_chance: float = 1e-5
     """Chance of a sound recording above that limit, where few innovations scatter."""
 
+    unseen_scale: float = 0.01
+    """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
+
+    unseen_sigmas: float = 2.0
+    """Standard uncertainties by which it then shifts the angle, to be told."""
+
     flexure_ratio: float = 5.0
     """Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
 

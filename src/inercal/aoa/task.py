@@ -12,6 +12,7 @@ import numpy as np
 from inercal.aoa.angles import Angles
 from inercal.aoa.diagnosis.choice import decided_with, of_delay, of_rectification, of_vibration
 from inercal.aoa.diagnosis.examination import diagnose, implausible
+from inercal.aoa.diagnosis.unseen import unseen_scale
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
@@ -138,7 +139,7 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
-        findings += of_delay(delay, of, filtered)
+        findings += [*of_delay(delay, of, filtered), *unseen_scale(zeroed, of)]
         known_u = angles.u[np.isfinite(angles.u)]
         if len(known_u):
             findings += of_rectification(recording, settings, float(np.median(known_u)))

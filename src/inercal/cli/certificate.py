@@ -165,10 +165,10 @@ def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Esti
 def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
     """Identity of a result in the store, where it is kept first if it came as a file."""
     from inercal.laboratory.catalog import find
-    from inercal.laboratory.keep import item_of, keep
+    from inercal.laboratory.keep import item_of, keep, saved_in
 
     if Path(given).is_file():
-        return keep(store, estimate, item_of(estimate), report, made_here=False).id
+        return keep(store, estimate, item_of(estimate), report, saved_in(Path(given), estimate)).id
     return find(store, given)
 
 

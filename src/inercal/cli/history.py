@@ -23,7 +23,8 @@ def history(
         list[str] | None, Parameter(help="Only this coefficient, or group such as K1. May be repeated.")
     ] = None,
     tolerance: Annotated[
-        Path | None, Parameter(help="File (TOML) with the table [specification] of tolerances.")
+        Path | None,
+        Parameter(help="File (TOML) with the table [specification]; that of the last study if absent."),
     ] = None,
     until: Annotated[
         str | None,

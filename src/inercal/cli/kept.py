@@ -32,7 +32,7 @@ def keep(
     from inercal.estimate.files import load
     from inercal.estimate.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
-    from inercal.laboratory.keep import item_of
+    from inercal.laboratory.keep import item_of, saved_in
     from inercal.laboratory.keep import keep as kept
     from inercal.laboratory.store import open_store
     from inercal.records.read import source_of
@@ -45,7 +45,7 @@ def keep(
         raise InputError(
             report, f"cannot be read ({error.strerror}), expected the report of the result"
         ) from error
-    done = kept(opened, estimate, item_of(estimate, instrument), page, made_here=False)
+    done = kept(opened, estimate, item_of(estimate, instrument), page, saved_in(result, estimate))
     for note in done.notes:
         output.say(note)
     words = f"{done.id[:SHORT]} {'kept' if done.new else 'was kept before, nothing added'} in {opened.where}"

@@ -75,7 +75,8 @@ def selfcal(
     with compiling(f"selfcal{of_all}", output.say):
         system.prepare(of, compare)
     with working(output) as progress:
-        outcome = system.calibrate(records, of, compare, progress)
+        file = output.out is not None and output.out.suffix.lower() in SUFFIXES
+        outcome = system.calibrate(records, of, compare, progress, output.report is not None or file)
     return give(outcome, output, read_s)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,14 +52,13 @@ def keep(
     >>> identity == ic.keep(found, "Portabiles, NilsPod, 2", store=place)
     True
     """
-    from inercal.laboratory.keep import item_of
+    from inercal.laboratory.keep import item_of, saved_in
     from inercal.laboratory.keep import keep as kept
     from inercal.laboratory.store import open_store
 
     estimate, _ = estimate_of(result)
-    return kept(
-        open_store(store), estimate, item_of(estimate, instrument), made_here=isinstance(result, Result)
-    ).id
+    saved = saved_in(Path(result), estimate) if isinstance(result, str | Path) else None
+    return kept(open_store(store), estimate, item_of(estimate, instrument), saved=saved).id
 
 
 def history(
@@ -78,7 +77,8 @@ def history(
     coefficients : sequence of str, optional
         The coefficients wanted, or groups such as ``K1``; all if absent.
     tolerance : Specification, optional
-        Tolerances with their rule of decision (`inercal.laboratory.specification.specification_of`).
+        Tolerances with their rule of decision (`inercal.laboratory.specification.specification_of`); those of the
+        last result's study if absent.
     at : date, optional
         For which values are predicted; a year after the last calibration if absent.
     store : str, optional
@@ -110,12 +110,17 @@ def history(
 
     inputs: tuple[Source, ...] = ()
     if len(of) == 1 and isinstance(of[0], str) and not Path(of[0]).is_file():
-        from inercal.laboratory.catalog import values_of
+        from inercal.laboratory.catalog import show, values_of
         from inercal.laboratory.store import open_store
 
-        name, rows = of[0], values_of(open_store(store), of[0])
+        opened, name = open_store(store), of[0]
+        rows = values_of(opened, name)
+        last = show(opened, rows[-1]["id"]).estimate if rows and tolerance is None else None
     else:
         name, rows, inputs = _of_results(of)
+        last = estimate_of(of[-1])[0]
+    if tolerance is None and last is not None:
+        tolerance = _stated(last)
     found = history_of(rows, name, coefficients, tolerance, at)
     estimate = estimated(found, inputs)
     view = View(
@@ -126,6 +131,15 @@ def history(
         lambda: pictures(found)[0],
     )
     return Result(estimate, view, found)
+
+
+def _stated(estimate: Estimate) -> Specification | None:
+    """Tolerances that the study of a result states, None without any."""
+    from inercal.laboratory.specification import specification_of
+
+    settings = estimate.provenance.get("settings")
+    table = settings.get("specification") if isinstance(settings, Mapping) else None
+    return specification_of(table, "the study of the last result") if isinstance(table, Mapping) else None
 
 
 def _of_results(of: Sequence[str | Path | Result]) -> tuple[str, list[dict[str, Any]], tuple[Source, ...]]:

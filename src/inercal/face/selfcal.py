@@ -25,22 +25,29 @@ def prepare(study: Study, compare: bool = False) -> None:
 
 
 def calibrate(
-    records: Sequence[Record], study: Study, compare: bool = False, progress: Progress = lambda _: None
+    records: Sequence[Record],
+    study: Study,
+    compare: bool = False,
+    progress: Progress = lambda _: None,
+    courses: bool = True,
 ) -> Result:
     """Calibrate a platform from one run, or from repeat runs together; ``evidence`` has a calibration for each.
 
-    Parameters and errors are those of `inercal.calibrate`.
+    Parameters and errors are those of `inercal.calibrate`; ``courses`` as of `inercal.selfcal.task.calibrate`.
     """
     if len(records) > 1 and compare:
         raise InputError("compare", f"found {len(records)} runs, expected one")
 
     calibrated = calibrations(
-        records, study, progress, lambda record, settings, say: task.calibrate(record, settings, compare, say)
+        records,
+        study,
+        progress,
+        lambda record, settings, say: task.calibrate(record, settings, compare, say, courses),
     )
-    return _one(calibrated[0]) if len(calibrated) == 1 else _repeated(calibrated, records)
+    return _one(calibrated[0], courses) if len(calibrated) == 1 else _repeated(calibrated, records)
 
 
-def _one(calibration: task.Calibration) -> Result:
+def _one(calibration: task.Calibration, courses: bool) -> Result:
     """The result of one run."""
     from inercal.selfcal.result.columns import history_record
 
@@ -57,7 +64,7 @@ def _one(calibration: task.Calibration) -> Result:
 
     kept = calibration.filtered.history is not None
     view = of_coefficients(calibration.estimate.shown(), page, more)
-    return Result(calibration.estimate, replace(view, rows=rows if kept else None), calibration)
+    return Result(calibration.estimate, replace(view, rows=rows if kept and courses else None), calibration)
 
 
 def _repeated(calibrated: Sequence[task.Calibration], records: Sequence[Record]) -> Result:

@@ -99,7 +99,7 @@ def keep(
     estimate: Estimate,
     item: Item | None,
     report: bytes | None = None,
-    made_here: bool = True,
+    saved: Mapping[str, Any] | None = None,
 ) -> Kept:
     """Keep a result with the files it rests on.
 
@@ -111,20 +111,22 @@ def keep(
         Its instrument; a result with coefficients must have one.
     report : bytes, optional
         Its page.
-    made_here : bool
-        This program made it, just now: its files must be as they were, and the sources' checksum is kept.
+    saved : mapping, optional
+        The JSON of a result that was made elsewhere, of which each key is kept as it is; without it this program made
+        the result, just now: its files must be as they were, and the checksum of the sources is kept.
 
     Raises
     ------
     InputError
-        Without an instrument, or a file of the result cannot be read or was changed (``made_here``).
+        Without an instrument, or a file of the result cannot be read or was changed (without ``saved``).
     """
     if item is None and estimate.names:
         raise InputError(
             "--instrument",
             'missing, expected "maker, model, serial" (or the serial under [item] in the study)',
         )
-    data = to_json(estimate)
+    data = to_json(estimate) | plain_objects(saved or {})
+    made_here = saved is None
     identity = id_of(data)
     files, notes = _files(store, estimate, made_here)
     text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
@@ -133,7 +135,7 @@ def keep(
         "object": store.objects.add(text.encode()),
         "report": None if report is None else store.objects.add(report),
         "command": data["command"],
-        "version": data["inercal"],
+        "version": str(data["inercal"]),
         "program": program() if made_here else "",
         "made": now(),
         "measured": str(data["traceability"].get("date") or ""),
@@ -175,6 +177,14 @@ class Rows:
         """SHA-256 of all rows."""
         more = [[dict(row) for row in many] for many in (self.coefficients, self.references)]
         return digest_of([dict(self.result), self.instrument, self.sources, *more])
+
+
+def saved_in(path: Path, estimate: Estimate) -> Mapping[str, Any]:
+    """The JSON of a result that was saved: of a JSON file as it is, else as this program writes it."""
+    if path.suffix.lower() != ".json":
+        return to_json(estimate)
+    data: dict[str, Any] = json.loads(path.read_bytes())
+    return data
 
 
 def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:

@@ -157,8 +157,15 @@ class Limits:
     alike_fits: int = 3
     """Constant errors that are fitted to see which are alike."""
 
-    columns_at_once: int = 1 << 21
-    """Angles of a recording times parameters, up to which their columns are found in one run."""
+    judged_rows: int = 1 << 15
+    """Rows whose innovations small errors are sought in; of a longer recording so many sums of rows that follow each
+    other: what is constant over hours is the same in a tenth of a second."""
+
+    columns_at_once: int = 1 << 23
+    """Angles that are judged times parameters, up to which their columns are found in one run."""
+
+    sway_bands: int = 100
+    """Bands of frequency, in one of which the sway of a base lies."""
 
     lock_cosine: float = 0.2
     """Cosine of the inner gimbal's angle below which innovations are left out: encoder noise is overstated there."""

@@ -59,6 +59,16 @@ class Noise:
         bounds=above_zero("a walk"),
     )  # fmt: skip
 
+    base_sway: float = quantity(
+        "amplitude of the sway of the base about level axes, noise to the encoders", "angle", "0 arcsec",
+        example="2 arcsec", bounds=within(0.0, math.inf, "an angle of 0 or more"),
+    )  # fmt: skip
+
+    @property
+    def of_readings(self) -> Noise:
+        """The same with the sway of the base in the noise of the encoders, which read angles against it."""
+        return replace(self, encoder=math.hypot(self.encoder, self.base_sway / math.sqrt(2.0)))
+
     @property
     def gyro_walk_sigma(self) -> float:
         """Standard deviation [rad/s] of the gyros' biases about their means."""
@@ -113,7 +123,8 @@ class Model:
 @dataclass(frozen=True)
 class Disturbances:
     """Errors that a simulation adds to the model: ``harmonics`` of encoders, a sin(k th + phase), as joint 0, 1, 2,
-    order k, amplitude [rad], phase [rad]; ``substeps`` of the truth lie between two rows."""
+    order k, amplitude [rad], phase [rad]; ``base_sway`` about two level axes, amplitude [rad] and frequency [Hz];
+    ``substeps`` of the truth lie between two rows."""
 
     dropouts: float = quantity(
         "part of the rows without accelerometers and angles", "number", "0", example="1 %", bounds=PART
@@ -135,6 +146,30 @@ class Disturbances:
         "of the platform, at times evenly from the first row to the last; constant if absent", "temperature",
         example=["20 degC", "21 degC"], at_least=2,
     )  # fmt: skip
+    flicker: float = quantity(
+        "1/f noise of the accelerometers, the floor of their Allan deviation", "acceleration", "0 ug", example="1 ug",
+        bounds=within(0.0, math.inf, "a deviation of 0 or more"),
+    )  # fmt: skip
+    gyro_flicker: float = quantity(
+        "the same of the gyros", "rate", "0 deg/h", example="0.001 deg/h",
+        bounds=within(0.0, math.inf, "a deviation of 0 or more"),
+    )  # fmt: skip
+    servo_jitter: float = quantity(
+        "random rate of the drive about each axis, which is commanded too", "rate", "0 deg/s", example="0.01 deg/s",
+        bounds=within(0.0, math.inf, "a rate of 0 or more"),
+    )  # fmt: skip
+    stamp_jitter: float = quantity(
+        "standard deviation of the time stamps", "time", "0 s", example="0.1 ms",
+        bounds=within(0.0, math.inf, "a time of 0 or more"),
+    )  # fmt: skip
+    quantisation: float = quantity(
+        "step of the encoders' readings", "angle", "0 arcsec", example="1 arcsec",
+        bounds=within(0.0, math.inf, "an angle of 0 or more"),
+    )  # fmt: skip
+    lost_rows: float = quantity(
+        "part of the rows that are not in the file", "number", "0", example="1 %", bounds=PART
+    )
+    base_sway: tuple[float, float] = (0.0, 0.0)
     substeps: int = 10
 
 

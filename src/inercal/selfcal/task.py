@@ -68,11 +68,13 @@ def calibrate(
     settings: SelfcalSettings,
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
+    courses: bool = True,
 ) -> Calibration:
     """Calibrate a platform from what it recorded while it turned; `recording_of` says which channels it has.
 
-    ``compare`` runs all other estimators too; ``progress`` is told each step of the work, in words. The status of the
-    estimate says whether its values can be used: nothing is raised for a poor one.
+    ``compare`` runs all other estimators too; ``progress`` is told each step of the work, in words. Without ``courses``
+    no coefficients are kept from row to row, as pages and histories show them. The status of the estimate says whether
+    its values can be used: nothing is raised for a poor one.
 
     Raises InputError where the record has not the channels of a platform or the study does not fit it, or where it
     leaves a heading unknown that the record does not tell.
@@ -87,7 +89,7 @@ def calibrate(
     settings, left_out = told_apart(settings, recording.th)
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
-    filtered = filtering.estimate(recording, of)
+    filtered = filtering.estimate(recording, of, courses=courses)
     assert filtered.history is not None
     along = filtered.history.attitude, filtered.coefficients
     bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)

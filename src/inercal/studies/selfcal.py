@@ -130,6 +130,17 @@ class HarmonicTable(Strict):
     phase: Angle | None = Field(default=None, description="at angle 0; 0 if absent")
 
 
+class SwayTable(Strict):
+    """Sway of the base about two level axes, a quarter of a period apart."""
+
+    amplitude: Annotated[Quantity, QuantityText("angle", "2 arcsec", positive, "an angle above zero")] = (
+        Field(description="about each axis")
+    )
+    frequency: Annotated[
+        Quantity, QuantityText("frequency", "0.3 Hz", positive, "a frequency above zero")
+    ] = Field(description="of both")
+
+
 _ON_RIG: Any = create_model("OnRig", __base__=table_of(Disturbances), **true_errors())
 
 
@@ -140,6 +151,12 @@ class DisturbancesTable(_ON_RIG):  # type: ignore[misc]
         default=[],
         description="errors of the encoders; none if absent",
         examples=[[{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "0 deg"}]],
+    )
+    base_sway: SwayTable | None = Field(
+        default=None,
+        title="Base sway",
+        description="sway of the base; none if absent",
+        examples=[{"amplitude": "2 arcsec", "frequency": "0.3 Hz"}],
     )
 
 
@@ -256,9 +273,11 @@ def _filter(table: Any) -> Filter:
 
 def _disturbances(table: Any) -> Disturbances:
     """Disturbances of a simulation."""
+    sway = table.base_sway
     return settings_of(
         Disturbances,
         table,
+        base_sway=(0.0, 0.0) if sway is None else (sway.amplitude.value, sway.frequency.value),
         harmonics=tuple(
             (
                 "xyz".index(each.axis),

@@ -12,7 +12,7 @@ Processes and Filtering Theory, 1970, section 8.4). G and D are the columns that
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,7 +64,11 @@ def sensitivities(
 
     ``attitudes`` (n, 4), ``coefficients`` and ``restarts`` as of `inercal.selfcal.before.bounds.recorded_bounds`.
     """
-    return -_carried(recording, problem, attitudes, coefficients, names, restarts, np.empty((0, 6, 0)))[3:]
+    return -_carried(recording, problem, attitudes, coefficients, names, restarts)[3:]
+
+
+_CHUNK = 1 << 14
+"""Rows whose innovations are changed at once."""
 
 
 def innovation_slopes(
@@ -73,13 +77,13 @@ def innovation_slopes(
     attitudes: Array,
     coefficients: Array,
     names: Sequence[str],
-    restarts: Sequence[int] = (),
-) -> Array:
-    """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities`
-    are of the estimates; 0 where nothing was measured."""
-    slopes = np.zeros((len(attitudes), 6, len(names)))
-    _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
-    return slopes[1:]
+    restarts: Sequence[int],
+    take: Callable[[int, Array], None],
+) -> None:
+    """Changes (k, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities` has
+    those of the estimates; 0 where nothing was measured. ``take`` is given the first step and the changes of k steps at
+    a time, in the order of the recording; their array is used again."""
+    _carried(recording, problem, attitudes, coefficients, names, restarts, take)
 
 
 def _carried(
@@ -89,10 +93,9 @@ def _carried(
     coefficients: Array,
     names: Sequence[str],
     restarts: Sequence[int],
-    slopes: Array,
+    take: Callable[[int, Array], None] | None = None,
 ) -> Array:
-    """Sensitivities (3 + p, m) of the errors of attitude and states at the end; ``slopes`` (n, 6, m), or (0, 6, m), are
-    written."""
+    """Sensitivities (3 + p, m) of the errors of attitude and states at the end; ``take`` as of `innovation_slopes`."""
     p, m = len(coefficients), len(names)
     states = problem.states
     place = np.full(len(ALL), -1, dtype=np.int64)
@@ -106,13 +109,22 @@ def _carried(
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     warm = np.zeros(len(q)) if recording.warm is None else recording.warm
-    first = 0
+    first, room = 0, np.zeros((_CHUNK if take else 0, 6, m))
     model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
-        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
-        path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
-        carry(P, S, path, full, model, slopes[rows])
+        begin = first
+        while True:  # a part begins with the last row of the one before
+            end = min(begin + len(room), last) if take else last
+            rows, steps = slice(begin, end), slice(begin, end if end < last else max(end - 1, 0))
+            path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
+            room[: end - begin] = 0.0
+            carry(P, S, path, full, model, room[: end - begin])
+            if take:
+                take(begin, room[1 : end - begin])
+            if end == last:
+                break
+            begin = end - 1
         if last < len(q):
             P[:3], P[:, :3], S[:3] = 0.0, 0.0, 0.0
             P[np.diag_indices(3)] = anew(problem, th[last]).sigma ** 2

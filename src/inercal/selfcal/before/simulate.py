@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
+from inercal.geometry.rotations import exp, multiply
 from inercal.records.record import Record, record_of
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import to_linear
@@ -80,13 +82,18 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     """Turn the platform once through its plan."""
     world, noise, other = experiment.world, experiment.noise, experiment.disturbances
     commanded, n = experiment.motion, len(experiment.motion.t)
-    fine = experiment.fine
+    t, rate, fine = commanded.t, commanded.rate, experiment.fine
+    if other.servo_jitter > 0.0:
+        own = other.servo_jitter * rng.standard_normal(rate.shape)
+        rate, fine = rate + own, fine + own[:, None]
     dt = float(commanded.t[1] - commanded.t[0]) / fine.shape[1]
     wander = rng.standard_normal(fine.shape)
     wander *= noise.angle_random_walk / np.sqrt(dt)
     step = dt * fine.shape[1]
     if other.gyro_walk > 0.0:
         wander += wandering(other.gyro_walk, step, n, rng)[:-1, None]
+    if other.gyro_flicker > 0.0:
+        wander += flicker(other.gyro_flicker, n, rng)[:-1, None]
     q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
     q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
     read = commanded.angles.copy()
@@ -96,15 +103,69 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     acc += noise.accelerometer * rng.standard_normal((n, 3))
     if other.accelerometer_walk > 0.0:
         acc += wandering(other.accelerometer_walk, step, n, rng)
+    if other.flicker > 0.0:
+        acc += flicker(other.flicker, n, rng)
     measured = (read if len(experiment.truth) > 24 else th) + noise.encoder * rng.standard_normal((n, 3))
     for joint, order, amplitude, phase in other.harmonics:
         measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
+    if other.base_sway[0] > 0.0:
+        swing = 2.0 * math.pi * (other.base_sway[1] * t + rng.random())
+        about = other.base_sway[0] * np.stack([np.cos(swing), np.sin(swing)], axis=-1) @ _level(world)
+        swayed = np.empty((n, 3))
+        all_angles(multiply(exp(-about), q), commanded.angles[0], world.axes, world.signs, swayed)
+        measured += swayed - th
+    if other.quantisation > 0.0:
+        measured = other.quantisation * np.round(measured / other.quantisation)
     acc[0] = np.nan
     if other.dropouts > 0.0:
         lost = np.append(False, rng.random(n - 1) < other.dropouts)
         acc[lost], measured[lost] = np.nan, np.nan
-    recording = Recording(commanded.t, commanded.rate, measured, acc, warm=experiment.warm)
-    return Simulated(recording, q, th)
+    if other.stamp_jitter > 0.0:
+        t = t + other.stamp_jitter * rng.standard_normal(n)
+        if np.diff(t).min() <= 0.0:
+            text = (
+                f"found {other.stamp_jitter:.3g} s for rows every {step:.3g} s, expected time that increases"
+            )
+            raise StudyError("disturbances.stamp_jitter", text)
+    recording = Recording(t, rate, measured, acc, warm=experiment.warm)
+    made = Simulated(recording, q, th)
+    if other.lost_rows == 0.0:
+        return made
+    return _rows(made, np.flatnonzero(np.append(True, rng.random(n - 1) >= other.lost_rows)))
+
+
+def _rows(made: Simulated, rows: NDArray[np.int64]) -> Simulated:
+    """Some of the rows; the others are not in the file, with their rates."""
+    whole = made.recording
+    recording = replace(
+        whole,
+        t=whole.t[rows],
+        rate=whole.rate[rows[:-1]],
+        th=whole.th[rows],
+        acc=whole.acc[rows],
+        warm=None if whole.warm is None else whole.warm[rows],
+    )
+    return Simulated(recording, made.attitude[rows], made.angles[rows])
+
+
+def _level(world: World) -> Array:
+    """Two level axes (2, 3) in b."""
+    up = world.up / np.linalg.norm(world.up)
+    first = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(up, first)])
+
+
+def flicker(level: float, n: int, rng: np.random.Generator) -> Array:
+    """1/f noise (n, 3) whose Allan deviation has its floor at a level: white noise, ``sqrt(pi / (2 ln 2))`` as large,
+    integrated by half (N. J. Kasdin, Discrete simulation of colored noise and stochastic processes and 1/f^a
+    power law noise generation, Proceedings of the IEEE 83 (1995) 802)."""
+    from scipy.signal import fftconvolve
+
+    k = np.arange(1, n)
+    response = np.cumprod(np.append(1.0, (k - 0.5) / k))
+    white = rng.standard_normal((n, 3)) * level * math.sqrt(0.5 * math.pi / math.log(2.0))
+    return np.asarray(fftconvolve(white, response[:, None], axes=0)[:n])
 
 
 def wandering(walk: float, step: float, n: int, rng: np.random.Generator) -> Array:

@@ -12,7 +12,7 @@ from inercal.estimate.consistency import whiteness
 from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, white
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, sound, white
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
@@ -43,9 +43,36 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
             findings.append(Finding("low_scatter", text))
     if findings:
         return findings
-    if not wide and whiteness(z) > LIMITS.risk:
-        return []
+    if not wide and (case[1].noise.base_sway > 0.0 or whiteness(z) > LIMITS.risk):
+        return []  # readings against a base that sways are not independent
+    if (swaying := _swaying(case, z)) is not None:
+        return [swaying]
     return [restless_gyros(case) or needed_states(case) or _unexplained(z)]
+
+
+def _swaying(case: Case, z: Array) -> Finding | None:
+    """One frequency in the innovations of the encoders, if any: Fisher's test of the largest ordinate of a periodogram
+    (R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society A 125 (1929) 54)."""
+    recording, problem = case
+    n, dt = len(z), float(np.median(recording.dt))
+    power = np.square(np.abs(np.fft.rfft(np.nan_to_num(z[:, 3:]), axis=0))).sum(axis=1)[1 : (n + 1) // 2]
+    if n < LIMITS.scatter_scalars or not power.any():
+        return None
+    largest = int(np.argmax(power))
+    rest = math.log1p(-min(float(power[largest] / power.sum()), 1.0 - 1e-9))
+    # sums over three joints are more even than one
+    if math.log(len(power)) + (len(power) - 1) * rest > math.log(LIMITS.risk):
+        return None
+    # turning joints spread it; two level axes sway alike
+    wide = len(power) // LIMITS.sway_bands
+    band = power[max(largest - wide, 0) : largest + wide + 1]
+    amplitude = math.sqrt(2.0 * float(band.sum())) / n * problem.noise.encoder
+    stated = replace(problem.noise, base_sway=amplitude).of_readings
+    if not sound(filtered((recording, replace(problem, noise=stated)))):
+        return None
+    hertz, seconds = (largest + 1) / (n * dt), math.degrees(amplitude) * 3600.0
+    text = f"the encoders' readings swing with {hertz:.2g} Hz, by some {seconds:.2g} arcsec: where the base sways, "
+    return Finding("excess_scatter", text + "state base_sway under [noise]", harm=EVERYTHING)
 
 
 def _even(columns: Array, mean: float) -> bool:

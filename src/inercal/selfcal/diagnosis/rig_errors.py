@@ -17,15 +17,20 @@ from inercal.arrays import Array
 from inercal.estimate.hypotheses import Fitted, Hypothesis
 from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.considered import innovation_slopes
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, near_lock
+from inercal.selfcal.diagnosis.fit_quality import Case, Sums, filtered, together
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import ALL, STATES, TEMPERATURE, UNIT_OF, twins
 
 Columns = Callable[[Case, Sequence[str]], Array]
-"""Change (n - 1, 6, m) of the innovations of a case where an error of each of some parameters (m,) is taken out."""
+"""Change (k, 6, m) of the innovations of a case, as the judge has them, where an error of each of some parameters (m,)
+is taken out."""
 
-_EXTENDED = "set extended = true under [filter]"
+Judged = tuple[Case, FilterResult]
+"""A case, and what the error-state filter makes of it."""
+
+_EXTENDED = 'take states = "extended" under [model]'
 
 #: kind -> what is wrong, and what to do where naming it under [model] is not enough
 _WORDS: Final[Mapping[str, tuple[str, str]]] = {
@@ -57,8 +62,10 @@ WANDERING: Final = {"ka0": "accelerometer biases wander", "kg0": "gyro biases wa
 _LATE: Final = {"tau_enc": "encoders", "tau_a": "accelerometers"}
 
 
-def rig_errors(case: Case) -> Iterator[Hypothesis[Case]]:
-    """Hypotheses of errors of the rig, without those that nobody can tell from others of them on this path."""
+def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
+    """Hypotheses of errors of the rig, without those that nobody can tell from others of them on this path; ``now`` is
+    what the filter makes of the case."""
+    about = case, now
     recording, problem = case
     still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
     left_out = twins(tuple(_WORDS), np.flatnonzero(still).tolist())
@@ -69,36 +76,48 @@ def rig_errors(case: Case) -> Iterator[Hypothesis[Case]]:
         if names and not known and (recording.warm is not None or kind not in TEMPERATURE):
             kinds[kind] = names
     late = tuple(name for name in _LATE if name not in problem.names)
-    columns = _together(case, (*(name for names in kinds.values() for name in names), *late))
+    columns = _together(about, (*(name for names in kinds.values() for name in names), *late))
     for kind, names in kinds.items():
         yield _kind(kind, names, columns)
     for name in late:
         yield _delay(name, columns)
-    yield _asymmetry(case)
-    for of, words in WANDERING.items():
-        if f"{of}_walk_x" not in problem.names:
-            yield _wander(case, of, words)
+    yield _asymmetry(about)
+    constant = [of for of in WANDERING if f"{of}_walk_x" not in problem.names]
+    names = tuple(name for of in constant for name in STATES[f"{of}_T1"].parameters)
+    wanders = _kept(
+        about,
+        LIMITS.wandering * len(names),
+        lambda case: _columns_by(about, case, [(wave, names) for wave in _waves(case[0])]),
+    )
+    for k, of in enumerate(constant):
+        yield _wander(of, wanders, slice(3 * k, 3 * k + 3))
 
 
-def _together(case: Case, names: tuple[str, ...]) -> Columns:
+def _together(about: Judged, names: tuple[str, ...]) -> Columns:
     """Columns of some parameters, all found in one run, where there is room for them, and then kept."""
-    all_of = _kept(case, len(names), lambda _: _columns(case, names))
+    all_of = _kept(about, len(names), lambda case: _columns(about, case, names))
 
     def columns(asked: Case, some: Sequence[str]) -> Array:
-        if len(names) * case[0].th.size > LIMITS.columns_at_once:
-            return _columns(asked, some)
+        if not _fit(about[0], len(names)):
+            return _columns(about, asked, some)
         return all_of(asked)[:, :, [names.index(name) for name in some]]
 
     return columns
 
 
-def _kept(case: Case, count: int, columns: Callable[[Case], Array]) -> Callable[[Case], Array]:
+def _fit(case: Case, count: int) -> bool:
+    """True where there is room for so many columns."""
+    recording = case[0]
+    return count * recording.th.size <= LIMITS.columns_at_once * together(recording)
+
+
+def _kept(about: Judged, count: int, columns: Callable[[Case], Array]) -> Callable[[Case], Array]:
     """So many columns, where there is room for them, of the first case for all: a refit moves them by next to nothing,
     and takes its residuals anew, so that it ends in the same place."""
     first = list[Array]()
 
     def of(asked: Case) -> Array:
-        if count * case[0].th.size > LIMITS.columns_at_once:
+        if not _fit(about[0], count):
             return columns(asked)
         if not first:
             first.append(columns(asked))
@@ -107,30 +126,29 @@ def _kept(case: Case, count: int, columns: Callable[[Case], Array]) -> Callable[
     return of
 
 
-def _columns(case: Case, names: Sequence[str]) -> Array:
-    """Change (n - 1, 6, m) of the innovations where an error of each of ``names`` (m,) is taken out."""
-    return _columns_by(case, [(case[0].warm, names)])
+def _columns(about: Judged, case: Case, names: Sequence[str]) -> Array:
+    """Change (k, 6, m) of the innovations where an error of each of ``names`` (m,) is taken out."""
+    return _columns_by(about, case, [(case[0].warm, names)])
 
 
-def _columns_by(case: Case, errors: Sequence[tuple[Array | None, Sequence[str]]]) -> Array:
+def _columns_by(about: Judged, case: Case, errors: Sequence[tuple[Array | None, Sequence[str]]]) -> Array:
     """The same of errors ``(course, names)``: those of temperature go with the ``course`` (n,) [K] instead."""
     recording, problem = case
-    now = filtered(case)
+    now = about[1] if case is about[0] else filtered(case)
     assert now.history is not None
     along = now.history.attitude, now.coefficients
-    parts = [
-        innovation_slopes(
-            recording if course is recording.warm else replace(recording, warm=course),
-            problem,
-            *along,
-            names,
-            now.restarts,
-        )
-        for course, names in errors
-    ]
-    slopes = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
-    slopes[near_lock(recording)] = np.nan
-    return -slopes
+    ends = np.cumsum([len(names) for _, names in errors])
+    all_of = np.empty((0, 6, 0))
+    for (course, names), end in zip(errors, ends, strict=True):
+        warmed = recording if course is recording.warm else replace(recording, warm=course)
+        sums = Sums(recording, now, len(names))
+        innovation_slopes(warmed, problem, *along, names, now.restarts, sums.take)
+        if len(errors) == 1:
+            return np.negative(sums.columns, out=sums.whole())
+        if not all_of.size:
+            all_of = np.empty((*sums.columns.shape[:2], int(ends[-1])))
+        np.negative(sums.whole(), out=all_of[:, :, end - len(names) : end])
+    return all_of
 
 
 def _stated_with(names: Sequence[str]) -> Callable[[Case, Array], Case]:
@@ -191,7 +209,7 @@ def _delay(name: str, columns: Columns) -> Hypothesis[Case]:
     )
 
 
-def _asymmetry(about: Case) -> Hypothesis[Case]:
+def _asymmetry(about: Judged) -> Hypothesis[Case]:
     """Accelerometers whose scale differs with the sign of the force; no state has it."""
     names = tuple(f"scale of accelerometer {i} forward less backward" for i in "xyz")
 
@@ -202,9 +220,8 @@ def _asymmetry(about: Case) -> Hypothesis[Case]:
     def derivative(case: Case) -> Array:
         signs = 0.5 * np.sign(np.nan_to_num(case[0].acc)).T
         names = STATES["ka1_T1"].parameters
-        return _columns_by(
-            case, [(np.ascontiguousarray(sign), (name,)) for sign, name in zip(signs, names, strict=True)]
-        )
+        courses = [(np.ascontiguousarray(sign), (name,)) for sign, name in zip(signs, names, strict=True)]
+        return _columns_by(about, case, courses)
 
     def says(fit: Fitted[Case]) -> str:
         shown = _shown(names, "1", fit)
@@ -213,33 +230,35 @@ def _asymmetry(about: Case) -> Hypothesis[Case]:
     return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=_kept(about, 3, derivative))
 
 
-def _wander(about: Case, of: str, words: str) -> Hypothesis[Case]:
-    """Biases ``ka0`` or ``kg0`` that wander about their means: cosines of time, of half a period, a whole one .."""
+def _wander(of: str, columns: Callable[[Case], Array], mine: slice) -> Hypothesis[Case]:
+    """Biases ``ka0`` or ``kg0`` that wander about their means: cosines of time, of half a period, a whole one ..; of
+    each there are ``columns`` of all biases, of which some are ``mine``."""
+    words = WANDERING[of]
     parameters = tuple(f"{of}_{i} {j}" for j in range(1, LIMITS.wandering + 1) for i in "xyz")
 
     def without(case: Case, values: Array) -> Case:
         recording, problem = case
-        biases = _waves(recording) @ values.reshape(-1, 3)
+        biases = _waves(recording).T @ values.reshape(-1, 3)
         if of == "ka0":
             return replace(recording, acc=recording.acc - biases), problem
         return replace(recording, rate=recording.rate + biases[1:]), problem
 
     def derivative(case: Case) -> Array:
-        names = STATES[f"{of}_T1"].parameters
-        return _columns_by(case, [(np.ascontiguousarray(wave), names) for wave in _waves(case[0]).T])
+        found = columns(case)
+        by_wave = found.reshape(*found.shape[:2], LIMITS.wandering, -1)[..., mine]
+        return by_wave.reshape(*found.shape[:2], len(parameters))
 
     def says(fit: Fitted[Case]) -> str:
         unit, size = shown_unit(UNIT_OF[f"{of}_x"])
-        course = _waves(fit.case[0]) @ fit.values.reshape(-1, 3)
+        course = _waves(fit.case[0]).T @ fit.values.reshape(-1, 3)
         worst = int(np.argmax(np.ptp(course, axis=0)))
         about = f"{of}_{'xyz'[worst]} by {np.ptp(course[:, worst]) / size:.2g} {unit}"
         return f"{words}, {about}: name bias_walk, or temperature, in states under [model]"
 
-    kept = _kept(about, len(parameters), derivative)
-    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=kept)
+    return Hypothesis(words, "unmodelled", says, without, parameters, derivative=derivative)
 
 
 def _waves(recording: Recording) -> Array:
-    """Cosines of time (n, LIMITS.wandering) over a recording."""
+    """Cosines of time (LIMITS.wandering, n) over a recording."""
     through = (recording.t - recording.t[0]) / (recording.t[-1] - recording.t[0])
-    return np.asarray(np.cos(np.pi * np.multiply.outer(through, np.arange(1, LIMITS.wandering + 1))))
+    return np.asarray(np.cos(np.pi * np.multiply.outer(np.arange(1, LIMITS.wandering + 1), through)))

@@ -82,7 +82,7 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     )
     if not case[1].states.has("delay"):
         yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
-    yield from rig_errors(case)
+    yield from rig_errors(case, now)
     yield from _harmonics(case, now)
 
 

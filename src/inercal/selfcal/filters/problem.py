@@ -155,9 +155,8 @@ class FilterProblem:
 def problem(settings: SelfcalSettings) -> FilterProblem:
     """The problem of a study."""
     vector = settings.states
-    return FilterProblem(
-        settings.world, settings.noise, settings.priors[vector.index], settings.filter, vector
-    )
+    noise = settings.noise.of_readings
+    return FilterProblem(settings.world, noise, settings.priors[vector.index], settings.filter, vector)
 
 
 @dataclass(frozen=True, eq=False)

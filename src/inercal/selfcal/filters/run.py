@@ -49,13 +49,14 @@ def estimate(
     start: Start | None = None,
     history: bool = True,
     brief: bool = False,
+    courses: bool = True,
 ) -> FilterResult:
     """Estimate the coefficients from a recording, by the estimator of the problem or another ``kind``.
 
     ``start`` of the attitude is the first encoder reading if absent; with ``history`` the estimates after each row are
     kept. Of more than the paper's coefficients a second pass gives the result (`second_pass`); history but its last
-    row, innovations and NIS are those of the first pass. A ``brief`` one, for a judge of the innovations, takes one
-    pass, and its history has attitudes alone.
+    row, innovations and NIS are those of the first pass. Without ``courses`` the history has attitudes alone, as has
+    that of a ``brief`` estimate, for a judge of the innovations, which takes one pass.
     """
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
@@ -65,7 +66,7 @@ def estimate(
     load_kernels(kind, problem)
     began = time.perf_counter()
     state = initial(module, problem, recording.th[0], recording.rate[0], start)
-    state, trace, rows = _passed(module, state, problem, recording, history, brief)
+    state, trace, rows = _passed(module, state, problem, recording, history, courses and not brief)
     if not brief and is_due(kind, problem):
         begun = initial(module, problem, recording.th[0], recording.rate[0], start)
         state = second_pass(module, begun, state, problem, recording.steps, recording.held, recording.walked)
@@ -104,14 +105,14 @@ def _passed(
     problem: FilterProblem,
     recording: Recording,
     history: bool,
-    brief: bool,
+    courses: bool,
 ) -> tuple[State, Trace, History | None]:
-    """The state after all steps, innovations and health, and estimates of the rows, of a ``brief`` one attitudes."""
+    """The state after all steps, innovations and health, and estimates of the rows, without ``courses`` attitudes."""
     steps, m, p = recording.steps, len(recording.dt), len(problem.prior)
     seen = np.all(np.isfinite(steps.th), axis=1)
     out = empty_estimates(0, p, history)._replace(nis=np.empty(m), dims=np.empty(m, dtype=np.int64))
     rows = vars(estimate_of(state, problem)) if history else {}
-    kept = [name for name in rows if name == "attitude" or not brief]
+    kept = [name for name in rows if name == "attitude" or courses]
     if history:
         out = out._replace(innovations=np.empty((m, 6)))
         more = {name: np.empty((m, rows[name].shape[1])) for name in kept}

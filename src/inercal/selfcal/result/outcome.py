@@ -106,7 +106,7 @@ def assemble(
     dof = float((measured.sum() if len(measured) else filtered.dims.sum()) - p - 3)
     of_site, exact = systematic(recording, settings, np.sqrt(np.diag(by_filter)))
     of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
-    sources = [*within(by_filter, bounds, settings.noise, max(dof, 1.0)), *of_site, *of_rig]
+    sources = [*within(by_filter, bounds, settings.noise.of_readings, max(dof, 1.0)), *of_site, *of_rig]
     uncertainty = combine(filtered.names, sources)
     if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
