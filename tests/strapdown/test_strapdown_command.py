@@ -67,23 +67,6 @@ def test_a_simulated_unit_is_found_again(folder, capsys):
     assert "Residual of each turn" in page
 
 
-def test_rates_beyond_those_of_the_calibration_are_named(folder, capsys):
-    """By `apply`, which compares with the largest rates about each axis, either way."""
-    assert calibrate("--out", "cal.json") == 0
-    (least, most) = ic.load("cal.json").estimate.conditions["ranges"]["rate_about_an_axis_rad_s"]
-    record = ic.read("run.npz")
-    for axis, low, high in zip("xyz", least, most, strict=True):
-        rate = record[f"gyro_{axis}"].values
-        assert (low, high) == pytest.approx((rate.min(), rate.max()), abs=0.01 * np.ptp(rate) + 1e-3)
-    columns = {name: record[name].values for name in record.columns}
-    for factor, beyond in ((0.9, False), (2.0, True)):
-        faster = {
-            name: values * factor if name.startswith("gyro") else values for name, values in columns.items()
-        }
-        applied = ic.apply("cal.json", ic.record(faster, rate=50.0, units={"gyro": "rad/s", "acc": "m/s^2"}))
-        assert ("outside_range" in {each.code for each in applied.findings}) is beyond
-
-
 def test_the_budget_adds_up_to_u(folder, capsys):
     calibrate("--out", "cal.json")
     estimate = ic.load("cal.json").estimate
