@@ -155,12 +155,7 @@ def design(
     for name, plan in plans.items():
         lasting = _lasting(plan, time)
         if not compared or lasting.dwell >= _shortest(settings):
-            along = bounds(pieces, lasting)
-            if not np.all(np.isfinite(along.history)):
-                raise StudyError(
-                    "plan",
-                    "found times, noise or priors whose bounds are lost in rounding, expected usual ones",
-                )
+            along = _sound(bounds(pieces, lasting))
             compared.append(ComparedPlan(name, lasting, along, along.u / goal))
     best = compared[0]
     of = "path" if tried else "plan"
@@ -301,13 +296,8 @@ def _turns(plan: Plan, along: PlanBounds) -> Table:
     rows = []
     C = start_attitude(plan)
     for k, ((axis, angle), told) in enumerate(zip(plan.turns, _told(along), strict=True), start=1):
-        lies = (
-            "vertical"
-            if abs(C[2, axis]) > math.cos(math.radians(20.0))
-            else "level"
-            if abs(C[2, axis]) < 0.35
-            else "slanting"
-        )
+        slope = math.degrees(math.asin(min(abs(C[2, axis]), 1.0)))
+        lies = "level" if slope < _NEAR else "vertical" if slope > 90.0 - _NEAR else "slanting"
         C = C @ elementary(AXES[axis], angle)
         words = ", ".join(f"{name} /{factor:.3g}" for name, factor in told[:_TOLD]) or "nothing new"
         rows.append((str(k), AXES[axis], f"{math.degrees(angle):g} deg", lies, words))
