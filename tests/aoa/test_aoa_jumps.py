@@ -33,7 +33,7 @@ for file in files:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @POSIX
 def test_the_whole_command_needs_no_memory_for_the_time_in_between(tmp_path):
     """12 s in two halves: all methods and the page fit in 4 GiB, where a value for each millisecond would not."""

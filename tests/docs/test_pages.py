@@ -139,6 +139,7 @@ def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
 def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
+    from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.specification import specification_of
     from inercal.records.maps import read_map
     from inercal.studies.load import (
@@ -156,6 +157,9 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
         keys = tomllib.loads(text)
         if keys.keys() & {"columns", "file"}:
             read_map(tmp_path / "study.toml")
+            continue
+        if "persons" in keys:
+            read_lab(tmp_path / "study.toml")
             continue
         if keys.keys() == {"specification"}:
             specification_of(keys["specification"], "study.toml")

@@ -9,15 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from certified import LAB
 
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.laboratory.catalog import results
+from inercal.laboratory.store import open_store
 from inercal.records.read import read
 from inercal.records.write import write_record
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-HEADINGS = ("Your own recording", "On a turntable", "On its own gimbals", "In a wind tunnel")
+HEADINGS = (
+    "Your own recording",
+    "On a turntable",
+    "On its own gimbals",
+    "In a wind tunnel",
+    "In the laboratory",
+)
 #: the one command of "Before you rely on it", which takes some ten seconds and is run by test_validate_command
 RUN_ELSEWHERE = ["inercal validate --report validation.html"]
 
@@ -58,6 +67,13 @@ def prepare(heading: str, folder: Path) -> None:
             arguments = ["calibrate", "imu", f"{run_}.csv", "--study", "known.toml", "--out", f"{out}.json"]
             assert run([*arguments, "--quiet"]) == 0
         (folder / "known.toml").unlink()
+    if heading == "In the laboratory":
+        instrument(folder)
+        shutil.copy(folder / "run1.csv", folder / "log.csv")
+        item = '[item]\nmaker = "M"\nmodel = "G"\nserial = "1234"\n[traceability]\ndate = "2026-01-30"\n'
+        site = '[site]\ngravity = "9.81(1) m/s^2"\nlatitude = "0.8 rad"\n'
+        (folder / "imu.toml").write_text(site + item, "utf-8")
+        (folder / "lab.toml").write_text(LAB, "utf-8")
     for example in ("selfcal", "sting"):
         if any(example in line for line in commands(heading)):
             with (
@@ -76,6 +92,8 @@ def test_the_commands_run(heading, tmp_path, monkeypatch, capsys):
     assert lines
     for line in lines:
         words, _, source = line.partition(" < ")
+        if "6fee8a0a58" in words:
+            words = words.replace("6fee8a0a58", results(open_store("lab"))[0].id[:10])
         given = (tmp_path / source).read_text("utf-8") if source else ""
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(given.encode())))
         code = run(shlex.split(words)[1:])

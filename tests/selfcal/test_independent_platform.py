@@ -151,10 +151,10 @@ def test_faults_do_what_their_words_say():
 @pytest.mark.slow
 def test_a_careful_rig_with_1_f_noise_is_calibrated(tmp_path):
     """Geometry of some seconds of arc, K2, delays of 0.2 ms, levers of 3 cm, and 1/f noise of 1 ug, which is no process
-    of first order: of 18 coefficients of 4 runs none is beyond 4.5 u, as chance has it in 1 of 2000 such tests. Without
+    of first order: of 18 coefficients of 2 runs none is beyond 4.5 u, as chance has it in 1 of 4000 such tests. Without
     biases that walk among the states it is told that some noise is not what is stated."""
     rng = np.random.default_rng(20261123)
-    for seed in range(4):
+    for seed in range(2):
         rig = Faults(
             gamma=5 * platform.ARCSEC * rng.standard_normal(3),
             zero=5 * platform.ARCSEC * rng.choice([-1.0, 1.0], 3),

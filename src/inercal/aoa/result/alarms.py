@@ -25,7 +25,7 @@ def beyond_limits(angles: Angles, t: Array, settings: AoaSettings) -> list[Findi
         return []
     first = beyond(settings, table[out[0]].tolist(), float(t[out[0]]))
     text = f"{first.message}; so are {counted(len(out), 'row')} of {len(t)}"
-    return [Finding(first.code, text, first.where)]
+    return [Finding("beyond_limits", text, first.where)]
 
 
 def beyond(settings: AoaSettings, row: Sequence[float], t: float) -> Finding:
