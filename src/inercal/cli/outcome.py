@@ -22,7 +22,7 @@ def emit(estimate: Estimate, text: str, output: Output) -> None:
     """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
     from inercal.estimate.files import to_json
 
-    output.emit(to_json(timed(estimate)), text)
+    output.emit(to_json(timed(estimate)) if output.json else {}, text)
 
 
 def hand_over(
