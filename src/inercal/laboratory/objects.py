@@ -116,10 +116,9 @@ class Objects:
 
     def pieces(self, sha256: str) -> Iterator[bytes]:
         """The bytes of an object in pieces; raises `InputError` as `read`, at the end for one that was changed."""
-        system, path = self._folder
         digest = hashlib.sha256()
         try:
-            with system.open(f"{path}/{sha256[:2]}/{sha256}", "rb") as file:
+            with self._opened(sha256) as file:
                 while piece := file.read(_PIECE):
                     digest.update(piece)
                     yield piece
@@ -132,12 +131,21 @@ class Objects:
                 self.place(sha256), f"has the SHA-256 {digest.hexdigest()[:12]}..., expected that of its name"
             )
 
+    def _opened(self, sha256: str) -> Any:
+        """An object opened; fsspec takes a while to load, and files of this machine need none of it."""
+        if self.local:
+            return open(self.place(sha256), "rb")
+        system, path = self._folder
+        return system.open(f"{path}/{sha256[:2]}/{sha256}", "rb")
+
     def names(self) -> set[str]:
         """The SHA-256 of all objects, by their names."""
-        system, path = self._folder
-        try:
-            found = system.find(path)
-        except FileNotFoundError:
-            return set()
-        names = {each.rpartition("/")[2] for each in found}
+        if self.local:
+            names = {name for _, _, files in os.walk(self.where) for name in files}
+        else:
+            system, path = self._folder
+            try:
+                names = {each.rpartition("/")[2] for each in system.find(path)}
+            except FileNotFoundError:
+                return set()
         return {name for name in names if not name.startswith(".")}  # left by a writer that was killed
