@@ -158,11 +158,10 @@ class Limits:
     """Constant errors that are fitted to see which are alike."""
 
     judged_rows: int = 1 << 15
-    """Rows whose innovations small errors are sought in; of a longer recording so many sums of rows that follow each
-    other: what is constant over hours is the same in a tenth of a second."""
+    """Rows whose innovations small errors are sought in; a longer recording is averaged over blocks of rows before."""
 
-    columns_at_once: int = 1 << 23
-    """Angles that are judged times parameters, up to which their columns are found in one run."""
+    block_turn: float = math.radians(20.0)
+    """Turn [rad] within a block of rows, at most."""
 
     sway_bands: int = 100
     """Bands of frequency, in one of which the sway of a base lies."""

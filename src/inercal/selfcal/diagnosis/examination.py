@@ -18,7 +18,7 @@ from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
 from inercal.instruments.terms import shown_unit
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, sum_of_squares, white
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, forget, sound, sum_of_squares, white
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
@@ -45,7 +45,20 @@ def diagnose(
     """
     if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []
-    repaired, fair, findings = _without_faults(recording, problem, systematic)
+    try:
+        return _diagnosed(recording, problem, result, systematic)
+    finally:
+        forget()
+
+
+def _diagnosed(
+    recording: Recording, problem: FilterProblem, result: FilterResult, systematic: Stated
+) -> list[Finding]:
+    """`diagnose` of a recording whose reading found it sound."""
+    if systematic is None and result.kind == "error-state" and sound(result):
+        repaired, fair, findings = recording, _fair(problem, problem, result), list[Finding]()
+    else:
+        repaired, fair, findings = _without_faults(recording, problem, systematic)
     if not findings or not sound(filtered((repaired, fair))):
         findings += _remaining((repaired, problem), fair, systematic)
     if findings or sound(result):
@@ -69,6 +82,8 @@ def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) ->
     # values are distributed about their mean with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
     far = (u < UNSEEN * prior) & ~(size < sigmas(LIMITS.risk, len(prior)) * spread)
+    if not far.any():
+        return moved
     return replace(
         moved,
         prior=np.where(far, LIMITS.widened_prior * np.maximum(size, prior), prior),
@@ -79,7 +94,8 @@ def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Fin
     """Errors that the model leaves out, priors that are too narrow, and misstated noise; ``meant`` as of `_fair`."""
     recording, problem = case
     fair = (recording, meant)
-    errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), systematic)
+    wider = problem if meant.prior is problem.prior else replace(problem, prior=meant.prior)
+    errors, corrected = small_errors((recording, wider), systematic)
     now = filtered(corrected)
     # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
     unexplained = bool(errors) and not white(corrected, now)

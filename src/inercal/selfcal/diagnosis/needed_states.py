@@ -13,7 +13,7 @@ import numpy as np
 
 from inercal.estimate.consistency import whiteness
 from inercal.findings import EVERYTHING, Finding
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, sound
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, short, sound
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, RIG, STATES
@@ -39,7 +39,7 @@ _FACTORS: Final = (1.0, 2.0, 4.0, 8.0)
 
 def needed_states(case: Case) -> Finding | None:
     """The first addition to the states that leaves innovations nearly white, if any."""
-    recording, problem = case
+    recording, problem = short(case)
     for kinds, words, named in _TRIED:
         walking = bool({*BIAS_WALK} & {*kinds})
         for factor in _FACTORS if walking else (1.0,):

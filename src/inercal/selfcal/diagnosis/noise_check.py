@@ -12,7 +12,7 @@ from inercal.estimate.consistency import whiteness
 from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, sound, white
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, short, sound, white
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
@@ -88,6 +88,7 @@ def _even(columns: Array, mean: float) -> bool:
 
 def restless_gyros(case: Case) -> Finding | None:
     """Gyro noise other than stated that explains the innovations, if any."""
+    case = short(case)
     for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
         fitting = list[float]()
         for factor in 2.0**octaves:
