@@ -18,7 +18,16 @@ from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
 from inercal.instruments.terms import shown_unit
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, forget, sound, sum_of_squares, white
+from inercal.selfcal.diagnosis.fit_quality import (
+    JUDGE,
+    Case,
+    filtered,
+    forget,
+    once,
+    sound,
+    sum_of_squares,
+    white,
+)
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
@@ -72,6 +81,7 @@ def _diagnosed(
     return findings
 
 
+@once
 def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) -> FilterProblem:
     """The problem as it may be meant: systematic inputs ``moved`` to where the recording fits best, and priors widened
     that the coefficients of the filter then contradict."""
@@ -90,12 +100,17 @@ def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) ->
     )
 
 
+@once
+def _widened(problem: FilterProblem, fair: FilterProblem) -> FilterProblem:
+    """The problem with the priors of another, itself where it has them."""
+    return problem if fair.prior is problem.prior else replace(problem, prior=fair.prior)
+
+
 def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Finding]:
     """Errors that the model leaves out, priors that are too narrow, and misstated noise; ``meant`` as of `_fair`."""
     recording, problem = case
     fair = (recording, meant)
-    wider = problem if meant.prior is problem.prior else replace(problem, prior=meant.prior)
-    errors, corrected = small_errors((recording, wider), systematic)
+    errors, corrected = small_errors((recording, _widened(problem, meant)), systematic)
     now = filtered(corrected)
     # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
     unexplained = bool(errors) and not white(corrected, now)
@@ -149,9 +164,7 @@ def _without_faults(
             single = likeliest(case, single_readings(case, now), JUDGE, LIMITS.risk)
             if single is not None and sound(after := filtered(single.case)):
                 best, then = single, after
-            elif sound(
-                filtered(small_errors((recording, replace(problem, prior=fair.prior)), systematic)[1])
-            ):
+            elif sound(filtered(small_errors((recording, _widened(problem, fair)), systematic)[1])):
                 break
         # what explains less than half is not what happened
         if best is None or not sum_of_squares(then) < LIMITS.explained_ratio * before:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,22 +38,30 @@ class ErrorState:
 JUDGE = ErrorState()
 
 
-def filtered(case: Case) -> FilterResult:
-    """Result of the error-state filter for a case."""
-    return _filtered(*case)
+Made = TypeVar("Made")
+_KEPT = list[Callable[[], None]]()
 
 
-@functools.lru_cache(maxsize=3)
-def _filtered(recording: Recording, problem: FilterProblem) -> FilterResult:
-    """`filtered`, of one and the same recording and problem once."""
-    return estimate(recording, problem, "error-state", brief=True)
+def once(function: Callable[..., Made]) -> Callable[..., Made]:
+    """A function whose last results, of one and the same arguments, are kept until `forget`."""
+    kept = functools.lru_cache(maxsize=3)(function)
+    _KEPT.append(kept.cache_clear)
+    return kept
 
 
 def forget() -> None:
     """Keep no results any longer."""
-    _filtered.cache_clear()
+    for clear in _KEPT:
+        clear()
 
 
+@once
+def filtered(case: Case) -> FilterResult:
+    """Result of the error-state filter for a case."""
+    return estimate(*case, "error-state", brief=True)
+
+
+@once
 def short(case: Case) -> Case:
     """A case of no more rows than small errors are sought in: a long recording by means over blocks of rows."""
     return averaged(*case, filtered(case)) if block(case[0]) > 1 else case

@@ -13,7 +13,7 @@ import numpy as np
 
 from inercal.estimate.consistency import whiteness
 from inercal.findings import EVERYTHING, Finding
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, short, sound
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, RIG, STATES
@@ -37,6 +37,7 @@ _FACTORS: Final = (1.0, 2.0, 4.0, 8.0)
 """Of the walks that are stated."""
 
 
+@once
 def needed_states(case: Case) -> Finding | None:
     """The first addition to the states that leaves innovations nearly white, if any."""
     recording, problem = short(case)

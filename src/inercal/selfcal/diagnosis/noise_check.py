@@ -12,7 +12,7 @@ from inercal.estimate.consistency import whiteness
 from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, short, sound, white
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound, white
 from inercal.selfcal.diagnosis.needed_states import needed_states
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
@@ -86,6 +86,7 @@ def _even(columns: Array, mean: float) -> bool:
     return True
 
 
+@once
 def restless_gyros(case: Case) -> Finding | None:
     """Gyro noise other than stated that explains the innovations, if any."""
     case = short(case)

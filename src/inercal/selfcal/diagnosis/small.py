@@ -21,7 +21,7 @@ from inercal.findings import EVERYTHING
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus
 from inercal.records.places import counted
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular, short
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, once, regular, short
 from inercal.selfcal.diagnosis.rig_errors import columns_of, kept, rig_errors
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
@@ -51,6 +51,7 @@ def likely(recording: Recording, problem: FilterProblem, systematic: Stated) -> 
     return systematic.without(case, fit.values)[1]
 
 
+@once
 def small_errors(case: Case, systematic: Stated = None) -> tuple[Fits[Case], Case]:
     """Constant errors beside those of the systematic inputs, and the case without any of them."""
     fewer = short(case)
