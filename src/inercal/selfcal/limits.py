@@ -151,6 +151,9 @@ class Limits:
     nearly_white: float = 1e-6
     """Probability of innovations as correlated, by chance, from which states of the rig explain them."""
 
+    left_over: float = 0.25
+    """Part of what innovations are off, in mean square or correlation, that a walk may leave of 1/f noise."""
+
     alike_misfit: float = 6.0
     """Sum of squares by which a constant error may explain less than the likeliest and still be called as possible."""
 

@@ -29,8 +29,7 @@ from inercal.selfcal.diagnosis.fit_quality import (
     white,
 )
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
-from inercal.selfcal.diagnosis.needed_states import needed_states
-from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
+from inercal.selfcal.diagnosis.noise_check import misstated, unsteady
 from inercal.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
@@ -114,10 +113,10 @@ def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Fin
     now = filtered(corrected)
     # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
     unexplained = bool(errors) and not white(corrected, now)
-    if unexplained or any(each.hypothesis.name in WANDERING.values() for each in errors):
-        walk = restless_gyros(fair) or (needed_states(fair) if unexplained else None)
-        if walk is not None:
-            return [walk]
+    wandering = any(each.hypothesis.name in WANDERING.values() for each in errors)
+    walk = unsteady(fair, unexplained) if unexplained or wandering else None
+    if walk is not None:
+        return [walk]
     rest = misstated(corrected, now)
     if errors and any(finding.code == "contradiction" for finding in rest):
         return misstated(fair, filtered(fair))  # errors that leave a contradiction are none
