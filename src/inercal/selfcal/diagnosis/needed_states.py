@@ -82,7 +82,7 @@ def needed_states(case: Case) -> Explained | None:
 
 
 def _off(recording: Recording, now: FilterResult) -> float:
-    """How far innovations are from white ones of the stated size: the largest, over both sensors, of what their mean
+    """Distance of innovations from white ones of the stated size: the largest, over both sensors, of what their mean
     square is off and of their correlation from row to row."""
     z, off = regular(recording, now), 0.0
     for columns in (z[:, :3], z[:, 3:]):

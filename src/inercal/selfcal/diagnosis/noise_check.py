@@ -51,8 +51,8 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
 
 
 def unsteady(case: Case, any_states: bool = True) -> Finding | None:
-    """What leaves innovations whiter, if anything: a walk of the gyros other than stated, or further states; the latter
-    beside the first alone unless ``any_states``. Where both do, the other is named as possible too."""
+    """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
+    other as possible too. States alone count with ``any_states`` only."""
     noise, states = restless_gyros(case), needed_states(case)
     found = [each for each in (noise, states if noise or any_states else None) if each]
     if not found:
@@ -126,7 +126,7 @@ def _two_digits(factor: float) -> str:
 
 
 def _left_by_walk(case: Case, factor: float) -> float:
-    """How white a walk of the gyros, larger by a factor, leaves innovations (`Explained`); 0 where it explains none."""
+    """Whiteness of innovations (`Explained`) that a walk of the gyros, larger by a factor, leaves; 0 if it explains none."""
     recording, problem = case
     noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
     now = filtered((recording, replace(problem, noise=noise)))
