@@ -126,7 +126,7 @@ def _two_digits(factor: float) -> str:
 
 
 def _left_by_walk(case: Case, factor: float) -> float:
-    """Whiteness of innovations (`Explained`) that a walk of the gyros, larger by a factor, leaves; 0 if it explains none."""
+    """Whiteness of innovations (`Explained`) with a walk of the gyros larger by a factor; 0 if it explains none."""
     recording, problem = case
     noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
     now = filtered((recording, replace(problem, noise=noise)))
