@@ -272,13 +272,6 @@ COMMANDS = {
         "inercal validate --report validation.html",
     ),
     **LABORATORY,
-    ("workbench", ""): (
-        "inercal.cli.workbench:workbench",
-        "Work in the browser: from a raw log to a certificate, on this machine and without any network.\n\n"
-        "Sessions and jobs lie in FOLDER and are found again when it is begun anew. The page shows the command "
-        "and the study for every step. Programs of a laboratory find the same under /api/v1. Needs the extra `workbench`.",
-        "inercal workbench",
-    ),
     ("schema", ""): (
         "inercal.cli.package:schema",
         "Print one JSON Schema that covers every kind of study file, for editors and checkers.",

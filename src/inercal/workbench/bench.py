@@ -1,4 +1,4 @@
-"""What pages and REST call: sessions, jobs, recordings looked at, results."""
+"""The bench, which pages and REST call: sessions, jobs, recordings looked at, results."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Bench:
 
     @property
     def lab(self) -> Path:
-        """What the laboratory states in its certificates."""
+        """The statements of the laboratory in its certificates."""
         return self.root / "lab.toml"
 
     def state(self, text: str) -> None:

@@ -20,8 +20,8 @@ ABANDONED = 75
 
 
 def _end_with_parent() -> None:
-    """Wait for the end of standard input."""
-    while sys.stdin.buffer.read(1 << 16):
+    """Wait for the end of standard input, without its buffer, which Python locks at its own end."""
+    while os.read(0, 1 << 16):
         pass
     os._exit(ABANDONED)
 
@@ -33,11 +33,9 @@ def main(folder: Path, arguments: list[str]) -> int:
     from inercal.cli import run
 
     code = run(arguments)
-    sys.stdout.flush()
     write_text(folder / "end", f"{code}\n")
     return code
 
 
 if __name__ == "__main__":
-    # at once: what is being computed in other threads is of no use any more
-    os._exit(main(Path(sys.argv[1]), sys.argv[2:]))
+    sys.exit(main(Path(sys.argv[1]), sys.argv[2:]))

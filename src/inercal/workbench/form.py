@@ -13,7 +13,7 @@ from typing import Any, Literal
 from inercal.errors import InercalError, InputError
 
 Widget = Literal["choice", "switch", "text", "value"]
-"""How a key is typed: chosen, switched, a text, or any value of TOML."""
+"""Kinds of typing a key: chosen, switched, a text, or any value of TOML."""
 
 _DEEPEST = 3
 
@@ -78,7 +78,7 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def problem(kind: str, text: str) -> str:
-    """What is wrong with a study, in one sentence; empty where nothing is."""
+    """The fault of a study in one sentence; empty without one."""
     from inercal.studies.load import reader
 
     try:
@@ -98,7 +98,7 @@ def changed(text: str, path: str, value: str) -> str:
     for edited in _edits(lines, path, value, wanted):
         made = "\n".join(edited) + "\n"
         try:
-            if tomllib.loads(made) == wanted:
+            if _filled(tomllib.loads(made)) == _filled(wanted):
                 return made
         except tomllib.TOMLDecodeError:
             continue
@@ -106,10 +106,16 @@ def changed(text: str, path: str, value: str) -> str:
 
 
 def as_toml(typed: str, widget: Widget) -> str:
-    """What was typed, as TOML; empty for nothing."""
+    """A typed text as TOML; empty for nothing. A value that is no TOML is a text, as behind ``--set``."""
     typed = typed.strip()
-    if not typed or widget in ("switch", "value"):
+    if not typed or widget == "switch":
         return typed
+    if widget == "value":
+        try:
+            if list(tomllib.loads(f"value = {typed}")) == ["value"]:
+                return typed
+        except tomllib.TOMLDecodeError:
+            pass
     return json.dumps(typed, ensure_ascii=False)
 
 
@@ -182,6 +188,12 @@ def _with(data: Mapping[str, Any], path: list[str], value: Any) -> dict[str, Any
     else:
         copy[path[0]] = value
     return copy
+
+
+def _filled(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys without the tables that hold nothing."""
+    whole = {key: _filled(each) if isinstance(each, Mapping) else each for key, each in data.items()}
+    return {key: each for key, each in whole.items() if each != {}}
 
 
 def _edits(lines: list[str], path: str, value: str, wanted: Mapping[str, Any]) -> Iterator[list[str]]:

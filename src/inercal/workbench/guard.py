@@ -1,4 +1,4 @@
-"""What reaches the workbench: requests of its own pages and of programs that know the key, and nothing else.
+"""The guard before the workbench: lets in requests of its own pages and of programs that know the key.
 
 A page of somebody else in the same browser can send requests to this machine, and by a name that changes its address
 even read the answers (DNS rebinding). So the host must be this machine by number or name, the origin the workbench

@@ -29,7 +29,7 @@ _PATIENCE = 5.0
 
 
 class State(StrEnum):
-    """What became of a job."""
+    """The state of a job."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -80,12 +80,12 @@ class Job:
 
     @property
     def said(self) -> str:
-        """What the command has said to people."""
+        """The words of the command to people."""
         return _text(self.folder / "said")
 
     @property
     def progress(self) -> str:
-        """What the command is at: its last words."""
+        """The last words of the command on its way."""
         lines = _text(self.folder / "progress").splitlines()
         return lines[-1] if lines else ""
 
@@ -215,6 +215,8 @@ class Queue:
                     continue
                 self._process, self._running = process, job.id
             process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
             with self._changed:
                 self._process, self._running = None, None
                 job = self._jobs[job.id]

@@ -21,21 +21,21 @@ from inercal.workbench.sessions import Session, receive, safe_name
 
 
 class Begun(BaseModel):
-    """What a new session is of: a title, or the name of a shipped example."""
+    """The wish for a session: a title, or the name of a shipped example."""
 
     title: str = "session"
     example: str | None = None
 
 
 class Asked(BaseModel):
-    """What a study is begun for: the kind, guessed where it is not said; the sample rate of files without times."""
+    """The wish for a study: the kind, guessed where it is not said; the sample rate of files without times."""
 
     kind: str | None = None
     rate: str | None = None
 
 
 class Certified(BaseModel):
-    """What a certificate needs beside the statements of the laboratory: its number."""
+    """The wish for a certificate: its number."""
 
     number: str
 
@@ -49,9 +49,7 @@ def rest_of(bench: Bench) -> FastAPI:
         redoc_url=None,
     )
 
-    @app.exception_handler(InercalError)
-    async def refused(request: Request, error: InercalError) -> JSONResponse:
-        return JSONResponse({"error": str(error)}, 422)
+    app.add_exception_handler(InercalError, _refused)
 
     @app.get("/sessions")
     def sessions() -> list[dict[str, Any]]:
@@ -145,6 +143,11 @@ def rest_of(bench: Bench) -> FastAPI:
         return Response(status_code=204)
 
     return app
+
+
+def _refused(request: Request, error: Exception) -> JSONResponse:
+    """The sentence of a refusal."""
+    return JSONResponse({"error": str(error)}, 422)
 
 
 def _of_session(session: Session) -> dict[str, Any]:

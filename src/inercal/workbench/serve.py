@@ -22,7 +22,7 @@ HERE = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Door:
-    """Where the workbench is reached: host and port, and the password that other machines need, empty on this one."""
+    """The door of the workbench: host and port, and the password that other machines need, empty on this one."""
 
     host: str = HERE
     port: int = 0

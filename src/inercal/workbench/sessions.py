@@ -196,6 +196,8 @@ async def receive(session: Session, given: str, body: AsyncIterator[bytes]) -> P
         target = session.folder / _place(part, name)
         os.replace(part, target)
         return target
+    except ConnectionError:  # of the sender
+        raise
     except OSError as error:
         raise InputError(name, f"cannot be written ({error.strerror or error})") from error
     finally:

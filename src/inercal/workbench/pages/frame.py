@@ -1,4 +1,4 @@
-"""What all pages have: head, ways to the others, the words of an error."""
+"""The frame of all pages: head, ways to the others, the words of an error."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def framed(title: str, session: Session | None = None, step: str = "") -> Iterat
         for target, words in _PLACES:
             _way(target, words, words == title)
         ui.space()
-        ui.button("Light", on_click=dark.disable).props("flat dense no-caps")
-        ui.button("Dark", on_click=dark.enable).props("flat dense no-caps")
+        button("Light", dark.disable)
+        button("Dark", dark.enable)
     if session is not None:
         with ui.element("nav").props('aria-label="steps"').classes("w-full flex gap-4"):
             for name, words in _STEPS:
@@ -71,7 +71,16 @@ def command(words: str) -> None:
     """The command that does the same, to copy."""
     with ui.row(wrap=False).classes("items-center w-full"):
         ui.label(words).classes("command grow").props('data-command="1"')
-        ui.button("Copy", on_click=lambda: ui.clipboard.write(words)).props("flat dense no-caps")
+        button("Copy", lambda: ui.clipboard.write(words))
+
+
+def button(words: str, act: Callable[[], object], label: str = "", main: bool = False) -> ui.button:
+    """A button that does something; the ``main`` one of a page is filled. ``label`` says more than its words."""
+    made = ui.button(words, on_click=act, color=None).props("no-caps unelevated")
+    made.classes("act main self-start" if main else "act self-start")
+    if label:
+        made.props(f'aria-label="{label}"')
+    return made
 
 
 def report(job: Job, title: str) -> None:
@@ -91,7 +100,10 @@ def table(
     head: Sequence[str], rows: Sequence[Sequence[str | Callable[[], object]]], numbers: Set[int] = frozenset()
 ) -> None:
     """A table of texts, or of what a callback makes; columns of ``numbers`` end at the right."""
-    with ui.element("div").classes("scroll"), ui.element("table").classes("plain"):
+    place = (
+        ui.element("div").classes("scroll").props(f'tabindex=0 role="region" aria-label="table by {head[0]}"')
+    )
+    with place, ui.element("table").classes("plain"):
         with ui.element("thead"), ui.element("tr"):
             for k, words in enumerate(head):
                 with ui.element("th").props('scope="col"').classes("number" if k in numbers else ""):

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from inercal.examples import EXAMPLES
 from inercal.workbench.bench import KINDS, Bench
-from inercal.workbench.pages.frame import framed, heading, table, told
+from inercal.workbench.pages.frame import button, framed, heading, table, told
 from inercal.workbench.sessions import COMMANDS, Session
 
 _SHOWN = 20
@@ -41,13 +41,11 @@ def add(bench: Bench) -> None:
 
 def _button(name: str, begin: Callable[[str], None]) -> None:
     """The button that begins a session with an example."""
-    ui.button("Open", on_click=lambda: begin(name)).props(
-        f'dense no-caps outline aria-label="open example {name}"'
-    )
+    button("Open", lambda: begin(name), label=f"open example {name}")
 
 
 def drop() -> None:
-    """Where recordings, a map or a study are dropped or chosen."""
+    """The place for recordings, a map or a study, to drop or to choose."""
     with ui.element("div").classes("drop"):
         ui.label(
             "Drop a recording anywhere on the page, with its column map or study if there is one, or choose:"
@@ -81,7 +79,7 @@ def sessions(bench: Bench) -> None:
 
 
 def _step(bench: Bench, session: Session) -> str:
-    """Where to go on with a session."""
+    """The page on which a session goes on."""
     job = bench.last_job(session)
     if job is None:
         return "recording"

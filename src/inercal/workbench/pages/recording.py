@@ -14,7 +14,7 @@ from inercal.records.channels import is_channel
 from inercal.workbench.bench import KINDS, Bench, Looked
 from inercal.workbench.charts import figure
 from inercal.workbench.form import Widget, as_toml, changed
-from inercal.workbench.pages.frame import command, framed, heading, refused, table, told
+from inercal.workbench.pages.frame import button, command, framed, heading, refused, table, told
 from inercal.workbench.pages.home import drop
 from inercal.workbench.sessions import MAP, STUDY, Session, put
 
@@ -56,7 +56,7 @@ def add(bench: Bench) -> None:
 
 
 def _kind(bench: Bench, session: Session) -> None:
-    """What the recording is of, to choose."""
+    """The kind of test that was recorded, to choose."""
 
     async def choose(event: events.ValueChangeEventArguments[str]) -> None:
         with told():
@@ -93,7 +93,7 @@ async def _look(bench: Bench, session: Session, place: ui.element) -> None:
 def _pictures(looked: Looked) -> None:
     """All channels over time; what one zooms to is drawn anew."""
     shown = looked.courses
-    plot = ui.plotly(figure(shown)).classes("w-full").props('aria-label="channels over time" role="img"')
+    plot = ui.plotly(figure(shown)).classes("w-full").props('aria-label="channels over time" role="group"')
 
     def zoomed(event: events.GenericEventArguments) -> None:
         moved, span = span_of(event.args)
@@ -104,7 +104,7 @@ def _pictures(looked: Looked) -> None:
 
 
 def span_of(told: object) -> tuple[bool, tuple[float, float] | None]:
-    """Whether plotly tells that the times of a picture were changed, and to which: None for all of them."""
+    """A change of the times of a picture that plotly tells, and the new ones: None for all of them."""
     if not isinstance(told, dict):
         return False, None
     if told.get("xaxis.autorange"):
@@ -200,4 +200,4 @@ def _text(session: Session, name: str, text: str) -> None:
             put(session, name, editor.value)
             ui.navigate.reload()
 
-    ui.button(f"Save {name}", on_click=save).props("no-caps outline dense").classes("self-start")
+    button(f"Save {name}", save)

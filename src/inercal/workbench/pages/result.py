@@ -13,7 +13,7 @@ from inercal.face.result import Result
 from inercal.findings import Status
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import Job, State
-from inercal.workbench.pages.frame import command, framed, heading, refused, report, table, told
+from inercal.workbench.pages.frame import button, command, framed, heading, refused, report, table, told
 
 
 def add(bench: Bench) -> None:
@@ -49,10 +49,13 @@ def add(bench: Bench) -> None:
             command(job.command)
 
 
+_COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
+
+
 def _verdict(result: Result) -> None:
     """The verdict in its colour, and what was found."""
     ui.label(f"{result.status.value}: {result.message}").classes(
-        "verdict " + ("ok" if result.status is Status.OK else "bad")
+        "verdict " + _COLOURS.get(result.status, "bad")
     ).props('data-verdict="1"')
     if result.findings:
         with ui.expansion(f"{len(result.findings)} findings", value=result.status is not Status.OK).classes(
@@ -76,7 +79,7 @@ def _coefficients(result: Result) -> None:
 
 
 def _budget(result: Result) -> None:
-    """Where the uncertainty comes from."""
+    """The sources of the uncertainty."""
     shares: dict[str, float] = {}
     for item in result.estimate.budget:
         shares[item.source] = max(shares.get(item.source, 0.0), max(item.share.values(), default=0.0))
@@ -115,7 +118,7 @@ def _compared(bench: Bench, job: Job) -> None:
                 report(ended, "comparison")
                 command(ended.command)
 
-    ui.button("Compare", on_click=compare).props("no-caps outline").classes("self-start")
+    button("Compare", compare)
 
 
 def _kept(bench: Bench, job: Job) -> None:
@@ -129,7 +132,7 @@ def _kept(bench: Bench, job: Job) -> None:
             ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
             _say(ended, "It is kept.")
 
-    ui.button("Keep", on_click=keep).props("no-caps outline").classes("self-start")
+    button("Keep", keep)
 
 
 def _certificate(bench: Bench, job: Job) -> None:
@@ -150,7 +153,7 @@ def _certificate(bench: Bench, job: Job) -> None:
                 bench.state(editor.value)
                 ui.notify("The statements of the laboratory are kept.")
 
-        ui.button("Save lab.toml", on_click=state).props("no-caps outline dense").classes("self-start")
+        button("Save lab.toml", state)
     number = ui.input("Number of the certificate")
     links = ui.row()
 
@@ -167,7 +170,7 @@ def _certificate(bench: Bench, job: Job) -> None:
                             f"Certificate, {words}", f"/api/v1/jobs/{ended.id}/files/{file}", new_tab=True
                         )
 
-    ui.button("Write the certificate", on_click=certify).props("no-caps outline").classes("self-start")
+    button("Write the certificate", certify)
 
 
 def _say(job: Job, words: str) -> None:

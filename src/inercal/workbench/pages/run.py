@@ -6,7 +6,7 @@ from nicegui import ui
 
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
-from inercal.workbench.pages.frame import command, framed, heading, table, told
+from inercal.workbench.pages.frame import button, command, framed, heading, table, told
 from inercal.workbench.sessions import Session
 
 _EVERY = 0.3
@@ -48,7 +48,7 @@ def _begin(bench: Bench, session: Session, words: str) -> None:
             bench.run(session)
             ui.navigate.reload()
 
-    ui.button(words, on_click=begin).props("no-caps").classes("self-start")
+    button(words, begin, main=True)
 
 
 def _follow(bench: Bench, session: Session, job: Job) -> None:
@@ -59,11 +59,7 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
     said = ui.label().classes("command")
     command(job.command)
     with ui.row():
-        cancel = (
-            ui.button("Cancel", on_click=lambda: bench.queue.cancel(job.id))
-            .props("no-caps outline")
-            .classes("self-start")
-        )
+        cancel = button("Cancel", lambda: bench.queue.cancel(job.id))
         again = ui.element("div")
     with again:
         _begin(bench, session, "Run again")

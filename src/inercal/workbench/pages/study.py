@@ -12,7 +12,7 @@ from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.workbench.bench import KINDS, Bench
 from inercal.workbench.form import Key, Table, as_toml, changed, parsed, problem, tables
-from inercal.workbench.pages.frame import command, framed, heading, refused, told
+from inercal.workbench.pages.frame import button, command, framed, heading, refused, told
 from inercal.workbench.sessions import STUDY, Session, put
 
 _OPEN = "?"
@@ -42,7 +42,7 @@ def _without(bench: Bench, session: Session) -> None:
             bench.begin_study(session, session.kind)
             ui.navigate.reload()
 
-    ui.button("Begin a study", on_click=begin).props("no-caps").classes("self-start")
+    button("Begin a study", begin, main=True)
 
 
 class Editor:
@@ -52,7 +52,7 @@ class Editor:
         self.session = session
         self.text = read_bytes(session.folder / STUDY).decode(errors="replace")
         self.verdict = ui.label().props('role="status" data-verdict="1"')
-        ui.button("Run", on_click=lambda: self.run(bench)).props("no-caps").classes("self-start")
+        button("Run", lambda: self.run(bench), main=True)
         with told():
             command(shlex.join(["inercal", *session.command(Path("cal.json"), Path("cal.html"))]))
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):

@@ -6,7 +6,7 @@ from nicegui import ui
 
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job
-from inercal.workbench.pages.frame import command, framed, report, told
+from inercal.workbench.pages.frame import button, command, framed, report, told
 from inercal.workbench.pages.run import WORDS
 
 _SESSION = "validation"
@@ -27,7 +27,7 @@ def add(bench: Bench) -> None:
                     ui.navigate.reload()
 
             ui.label("Published and closed-form cases that ship with inercal, run on this machine.")
-            ui.button("Run the validation", on_click=begin).props("no-caps").classes("self-start")
+            button("Run the validation", begin, main=True)
             command("inercal validate --report validation.html")
             if job is not None:
                 _follow(bench, job)
