@@ -46,8 +46,16 @@ def test_from_an_upload_to_a_certificate(bench, tmp_path):
     assert "digitalCalibrationCertificate" in xml
 
 
-def test_an_instrument_is_known_by_its_own_study_only(bench):
-    """A recording with a study of another kind is refused in one sentence, as on the command line."""
+@pytest.mark.parametrize(
+    ("example", "kind"), [("sting", "aoa"), ("selfcal", "selfcal"), ("strapdown", "strapdown")]
+)
+def test_a_study_that_comes_says_what_kind_the_session_is(bench, example, kind):
+    _, session = bench.ask("/api/v1/sessions", {"title": example})
+    put(bench, session["session"], "any.toml", (FOLDER / EXAMPLES[example].study).read_bytes())
+    assert bench.ask(f"/api/v1/sessions/{session['session']}")[1]["kind"] == kind
+
+
+def test_a_study_with_a_fault_is_refused_in_one_sentence(bench):
     _, session = bench.ask("/api/v1/sessions", {"title": "wrong"})
     put(bench, session["session"], "log.csv", b"t [s],acc_x [m/s^2]\n0,1\n")
     put(bench, session["session"], "study.toml", b'[site]\nlatitude = "45 m"\n')

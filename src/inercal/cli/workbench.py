@@ -10,8 +10,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli import show
-from inercal.cli.options import StoreOption
+from inercal.cli.options import Output, StoreOption
+from inercal.cli.outcome import emit
 from inercal.errors import InputError
 
 _PASSWORD = "INERCAL_WORKBENCH_PASSWORD"
@@ -34,10 +34,12 @@ def workbench(
     ] = "127.0.0.1",
     browser: Annotated[bool, Parameter(name="--no-browser", negative="", help="Open no browser.")] = False,
     store: StoreOption = None,
+    output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Serve the workbench until it is asked to end."""
     from platformdirs import user_data_path
 
+    from inercal.estimate.result import without_coefficients
     from inercal.workbench.bench import open_bench
     from inercal.workbench.serve import HERE, Door, serve
 
@@ -46,13 +48,13 @@ def workbench(
     password = "" if host == HERE else _password(host)
     root = folder or user_data_path("inercal", appauthor=False) / "workbench"
     bench = open_bench(root.absolute(), store)
+
+    def tell(address: str) -> None:
+        found = without_coefficients("workbench", f"inercal workbench: {address}", {"address": address})
+        emit(found, found.message, output)
+
     try:
-        serve(
-            bench,
-            Door(host, port, password),
-            lambda address: show(f"inercal workbench: {address}"),
-            not browser,
-        )
+        serve(bench, Door(host, port, password), tell, not browser)
     finally:
         bench.close()
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from inercal._files import write_text
 from inercal.errors import InercalError, InputError
 from inercal.workbench.jobs import Job, Queue
-from inercal.workbench.sessions import COMMANDS, MAP, STUDY, Session, Sessions
+from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions
 
 if TYPE_CHECKING:
     from inercal.face.result import Result
@@ -61,6 +61,12 @@ class Bench:
                 self._looked[key] = Looked(record, courses(record))
             self._looked.move_to_end(key)
             return self._looked[key]
+
+    def arrived(self, session: Session, path: Path) -> Session:
+        """The session with the kind of a study that has come; raises `StudyError` where that cannot be read."""
+        from inercal.face.study import kind_of
+
+        return self.sessions.of_kind(session, kind_of(path)) if path.name == STUDY else session
 
     def begin_study(self, session: Session, kind: str | None = None, rate: str | None = None) -> Session:
         """Write a study, and a guessed map, for the recordings of a session; those there are replaced.
@@ -158,6 +164,8 @@ def open_bench(root: Path, store: str | None = None) -> Bench:
     """The bench of a work folder, which is made where it is not there; raises `InputError`."""
     try:
         (root / "sessions").mkdir(parents=True, exist_ok=True)
+        for part in root.glob(f"sessions/*/.*{PART}"):  # of uploads that a crash cut off
+            part.unlink(missing_ok=True)
         return Bench(root, Sessions(root / "sessions"), Queue(root / "jobs"), store)
     except OSError as error:
         raise InputError(root, f"cannot be made a work folder ({error.strerror})") from error

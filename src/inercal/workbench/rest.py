@@ -77,7 +77,9 @@ def rest_of(bench: Bench) -> FastAPI:
     @app.put("/sessions/{number}/files/{name:path}", status_code=201)
     async def upload(number: str, name: str, request: Request) -> dict[str, Any]:
         """Add a file, the body of the request as it is; a TOML file is the column map or the study."""
-        path = await receive(bench.sessions.get(number), name, request.stream())
+        session = bench.sessions.get(number)
+        path = await receive(session, name, request.stream())
+        bench.arrived(session, path)
         return {"file": path.name, "bytes": path.stat().st_size}
 
     @app.get("/sessions/{number}/files/{name:path}")

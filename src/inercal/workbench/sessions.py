@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import tempfile
 import unicodedata
 from collections.abc import AsyncIterator, Iterator
 from contextlib import suppress
@@ -26,6 +27,9 @@ LARGEST = 8 * 1024**3
 
 SPARE = 512 * 1024**2
 """Bytes of the disk that an upload leaves free."""
+
+PART = ".part"
+"""Ending of a file that is on its way."""
 
 _ABOUT = "session.json"
 _LONGEST = 120
@@ -180,10 +184,10 @@ async def receive(session: Session, given: str, body: AsyncIterator[bytes]) -> P
     disk would be full.
     """
     name = safe_name(given)
-    part = session.folder / f".{name}.part"
-    count = 0
+    handle, path = tempfile.mkstemp(dir=session.folder, prefix=".", suffix=PART)
+    part, count = Path(path), 0
     try:
-        with open(part, "wb") as file:
+        with os.fdopen(handle, "wb") as file:
             async for piece in body:
                 count += len(piece)
                 if count > LARGEST:

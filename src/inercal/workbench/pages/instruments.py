@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
 from functools import partial
 from typing import Any
+from urllib.parse import urlencode
 
 from nicegui import ui
 
@@ -24,7 +26,11 @@ def add(bench: Bench) -> None:
             except InercalError as error:
                 refused(error)
                 ui.label("The first result that is kept needs a store; make one with:").classes("quiet")
-                command("inercal store init" + (f" {bench.store}" if bench.store else ""))
+                command(
+                    shlex.join(
+                        ["inercal", "store", "init", *(["--store", bench.store] if bench.store else [])]
+                    )
+                )
                 return
             if not found:
                 ui.label("No result was kept yet.").classes("quiet")
@@ -34,7 +40,9 @@ def add(bench: Bench) -> None:
                     [
                         row["maker"],
                         row["model"],
-                        partial(ui.link, row["serial"], f"/instruments/{row['serial']}"),
+                        partial(
+                            ui.link, row["serial"], f"/instrument?{urlencode({'serial': row['serial']})}"
+                        ),
                         str(row["results"]),
                         str(row["last"] or "")[:10],
                     ]
@@ -42,7 +50,7 @@ def add(bench: Bench) -> None:
                 ],
             )
 
-    @ui.page("/instruments/{serial}")
+    @ui.page("/instrument")
     async def one(serial: str) -> None:
         from inercal.face.laboratory import history
 
@@ -60,7 +68,8 @@ def add(bench: Bench) -> None:
                 .classes("report")
             )
             frame.props["srcdoc"] = page
-            command(f"inercal history {serial} --report history.html")
+            words = ["inercal", "history", serial, "--report", "history.html"]
+            command(shlex.join([*words, *(["--store", bench.store] if bench.store else [])]))
 
 
 def _instruments(bench: Bench) -> list[dict[str, Any]]:

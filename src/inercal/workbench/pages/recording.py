@@ -58,10 +58,21 @@ def add(bench: Bench) -> None:
 def _kind(bench: Bench, session: Session) -> None:
     """The kind of test that was recorded, to choose."""
 
-    async def choose(event: events.ValueChangeEventArguments[str]) -> None:
+    async def begin(kind: str) -> None:
         with told():
-            await asyncio.to_thread(bench.begin_study, session, event.value)
+            await asyncio.to_thread(bench.begin_study, session, kind)
             ui.navigate.reload()
+
+    async def choose(event: events.ValueChangeEventArguments[str]) -> None:
+        if session.study is None:
+            await begin(event.value)
+            return
+        with ui.dialog() as dialog, ui.card():
+            ui.label("A new study, and a map where one is needed, take the place of those there.")
+            with ui.row():
+                button("Begin anew", lambda: begin(event.value), main=True)
+                button("Leave them", ui.navigate.reload)
+        dialog.open()
 
     ui.select(dict(KINDS), value=session.kind, label="The recording is of", on_change=choose).classes(
         "w-96 max-w-full"
