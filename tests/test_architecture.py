@@ -154,7 +154,7 @@ WITHIN = {
         "known_turns ferraris aided temperature task figures"
     ),
     "strapdown": (
-        "limits coefficients settings kernels samples arrow simulate rests start batch bounds path_search design "
+        "limits coefficients settings kernels samples arrow simulate rests start batch error_state bounds path_search design "
         "budget left_out restricted reading outcome task figures"
     ),
     "turntable": (

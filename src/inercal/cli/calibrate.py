@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -48,13 +48,18 @@ def calibrate_strapdown(
     /,
     *,
     study: StudyFile,
+    estimator: Annotated[
+        Literal["batch", "error-state"] | None,
+        Parameter(name="--filter", help="Estimator, in the place of that of the study."),
+    ] = None,
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate a strapdown unit from rests and coarse turns."""
-    return _calibrated("strapdown", files, study, map_file, span, overrides, output)
+    keys = [*(overrides or ()), *([f"strapdown.filter={estimator}"] if estimator is not None else [])]
+    return _calibrated("strapdown", files, study, map_file, span, keys, output)
 
 
 def calibrate_turntable(
