@@ -31,11 +31,12 @@ from inercal.strapdown.start import beginning, first_coefficients
 @short_repr
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """Coefficients ``c`` (51,) by the filter, with the ``covariance`` (p, p) of those that are free, its ``passes``
-    until it ``converged``; after each rest their covariance ``history`` (rests, p, p) and the mean ``nis`` (rests,) of
-    the squares of its innovations over their variance, of the last pass."""
+    """Coefficients ``c`` (51,) and attitude at the start ``q_nb`` (4,) by the filter, with the ``covariance`` (p, p)
+    of coefficients that are free, its ``passes`` until it ``converged``; after each rest that covariance ``history``
+    (rests, p, p) and the mean ``nis`` (rests,) of the squares of innovations over their variance, of the last pass."""
 
     c: Array
+    q_nb: Array
     covariance: Array
     passes: int
     converged: bool
@@ -179,20 +180,19 @@ class _Run:
 
 
 def filtered(
-    samples: Samples, nodes: Nodes, settings: StrapdownSettings, begin: Array | None = None
+    samples: Samples, nodes: Nodes, settings: StrapdownSettings, before: Filtered | None = None
 ) -> Filtered | None:
-    """The filter over a recording with nodes in its rests, from coefficients ``begin`` (51,) where some are known, by
-    open passes alone; None where its solution runs off."""
+    """The filter over a recording with nodes in its rests, by open passes alone from a result ``before`` of a part of
+    it; None where its solution runs off."""
     with np.errstate(all="ignore"):
-        found = _passes(samples, nodes, settings, begin)
+        found = _passes(samples, nodes, settings, before)
     return found if np.isfinite(found.c).all() and np.isfinite(found.history).all() else None
 
 
-def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begin: Array | None) -> Filtered:
+def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, before: Filtered | None) -> Filtered:
     """Passes until the coefficients stay."""
     free = free_places(settings.terms, settings.gravity_u > 0.0, settings.site.latitude_u > 0.0)
-    prior = settings.deviations()[free]
-    c = first_coefficients(samples, nodes) if begin is None else begin.copy()
+    prior, c = settings.deviations()[free], first_coefficients(samples, nodes)
     at = beginning(freed(samples, c), nodes, settings)
 
     def ran(q: Array, feed: bool) -> tuple[_Run, Array, Array]:
@@ -203,12 +203,16 @@ def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begin: 
         run.begun(off, u, -c[free], prior)
         return run, *run.through(q, feed)
 
-    tried = 1 if at.u[2] <= LIMITS.unknown_heading else LIMITS.headings
-    runs = []
-    for k in range(tried):
-        q = normalize(multiply(exp(np.array([0.0, 0.0, 2.0 * np.pi * k / tried])), at.q_nb))
-        runs.append((*ran(q, True), q))
-    run, history, nis, q = min(runs, key=lambda each: float(np.mean(each[2])))
+    if before is None:
+        tried = 1 if at.u[2] <= LIMITS.unknown_heading else LIMITS.headings
+        runs = []
+        for k in range(tried):
+            q = normalize(multiply(exp(np.array([0.0, 0.0, 2.0 * np.pi * k / tried])), at.q_nb))
+            runs.append((*ran(q, True), q))
+        run, history, nis, q = min(runs, key=lambda each: float(np.mean(each[2])))
+    else:
+        c, q = before.c.copy(), before.q_nb
+        run, history, nis = ran(q, False)
     passes = 1
     while True:
         step, start = run.s[-len(free) :], run.s[run.m + 3 : run.m + 6]
@@ -216,7 +220,8 @@ def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begin: 
         q = normalize(multiply(exp(start), q))
         covariance = run.P[-len(free) :, -len(free) :]
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        if (passes > 1 and size < LIMITS.step) or passes >= LIMITS.filter_passes or not np.isfinite(size):
-            return Filtered(c, covariance, passes, size < LIMITS.step, history, nis)
+        done = size < LIMITS.step and (passes > 1 or before is not None)
+        if done or passes >= LIMITS.filter_passes or not np.isfinite(size):
+            return Filtered(c, q, covariance, passes, size < LIMITS.step, history, nis)
         run, history, nis = ran(q, False)
         passes += 1
