@@ -295,7 +295,10 @@ def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[
     )
     hidden = [name for name in left if group_of(name) in ("size", "delay") and left[name] > HALF_SEEN]
     if hidden:
-        text += f"; {counted_names(hidden, 6)} cannot be told beside it and stay at their prior"
+        text += (
+            f"; {counted_names(hidden, 6)} cannot be told beside it and stay at their prior. Of rests in 10 poses or "
+            "more `inercal calibrate imu` with method multiposition tells the rest without velocities over turns"
+        )
     return [Finding("turn_noise", text)]
 
 

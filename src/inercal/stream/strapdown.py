@@ -34,9 +34,9 @@ _CHECK = 1.0
 
 
 class StrapdownState(NamedTuple):
-    """State after a row: ``rows`` (capacity, 7), of which ``filled`` are in use, with stamp, rate and force in SI; first
-    and last sample of the ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,) after
-    the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said."""
+    """State after a row: ``rows`` (capacity, 7), of which ``filled`` are in use, with stamp, rate and force in SI;
+    first and last sample of the ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,)
+    after the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said."""
 
     rows: Array
     filled: int
