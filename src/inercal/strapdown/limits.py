@@ -78,9 +78,14 @@ class Limits:
     iterations: int = 30
     """Steps at most."""
 
+    patience: int = 10
+    """Steps after which a larger one ends the iteration, too: of a model that lacks much no more is to be had."""
+
+    late_step: float = 0.02
+    """That step, over the standard uncertainties."""
+
     last_step: float = 0.2
-    """Largest step, over the standard uncertainties, of the last of these at which the fit still counts: with a model
-    that lacks much, steps end in a small wandering."""
+    """Largest step, over the standard uncertainties, of the last of all, at which the fit still counts."""
 
     scoring: int = 60
     """Steps at most to the noise that a record shows, of one linear problem."""
