@@ -19,6 +19,7 @@ from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.considered import innovation_slopes
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular
 from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import ALL, STATES, TEMPERATURE, UNIT_OF, twins
@@ -49,6 +50,7 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "levers": ("the accelerometers are not at the centre of the gimbals", ""),
     "scale_asymmetry": ("the scale of the gyros is not the same both ways", ""),
     "g_sensitivity": ("the gyros drift by specific force", ""),
+    "harmonics": ("the encoders err periodically with their angles", ""),
     "sag": ("gravity turns the sensors on the platform", ""),
     "kg0_T1": ("the gyro biases change with temperature", ""),
     "ka0_T1": ("the accelerometer biases change with temperature", ""),
@@ -68,7 +70,7 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     about = case, now
     recording, problem = case
     still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
-    left_out = twins(tuple(_WORDS), np.flatnonzero(still).tolist())
+    left_out = {*twins(tuple(_WORDS), np.flatnonzero(still).tolist()), *_unturned(recording, problem)}
     kinds = dict[str, tuple[str, ...]]()
     for kind in _WORDS:
         names = tuple(name for name in STATES[kind].parameters if name not in left_out)
@@ -87,6 +89,18 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     wanders = kept(lambda case: _columns_by(about, case, [(wave, names) for wave in _waves(case[0])]))
     for k, of in enumerate(constant):
         yield _wander(of, wanders, slice(3 * k, 3 * k + 3))
+
+
+def _unturned(recording: Recording, problem: FilterProblem) -> tuple[str, ...]:
+    """Harmonics that cannot be told from a constant, as their joints turn by less than half a period; and those for
+    which the study names no wave."""
+    turned, waves = (
+        np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0),
+        problem.states.harmonics,
+    )
+    names = STATES["harmonics"].parameters
+    few = [k for k, (joint, order) in enumerate(waves) if order * turned[joint] < np.pi]
+    return *names[2 * len(waves) :], *(name for k in few for name in names[2 * k : 2 * k + 2])
 
 
 def _together(about: Judged, names: tuple[str, ...]) -> Columns:
