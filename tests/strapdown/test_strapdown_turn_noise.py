@@ -8,12 +8,14 @@ import strapdown_faults as faults
 from grades import MEMS, TACTICAL, drawn
 from scipy.stats import chi2
 
+import inercal as ic
 from inercal.findings import Status
 from inercal.strapdown.batch import fit
 from inercal.strapdown.restricted import solved, with_noise
 from inercal.strapdown.rests import found_rests, nodes_of
 from inercal.strapdown.settings import TURN_NOISE, WALKS
-from inercal.strapdown.simulate import simulated
+from inercal.strapdown.simulate import simulated, to_record
+from inercal.strapdown.task import calibrate
 
 
 def run(settings, seed):
@@ -106,8 +108,30 @@ def test_turns_that_are_clipped_leave_places_at_their_prior():
     assert estimate.status is Status.UNOBSERVABLE
     text = next(each.message for each in estimate.findings if each.code == "turn_noise")
     assert "r_xx, r_xy, r_xz, r_yx, r_yy, r_yz" in text
+    assert "`inercal calibrate imu` with method multiposition" in text
     for name in ("r_xx", "r_xy", "r_xz", "r_yx", "r_yy", "r_yz"):
         assert estimate[name].u > 0.9 * 0.05
+
+
+def test_of_few_rests_turns_tell_what_poses_do_not():
+    """Seven rests by quarter turns: enough as a strapdown unit, too few for poses, which say so; without a gyro, or
+    slower than 50 Hz, there is nothing to advise."""
+    plan = replace(MEMS.plan, turns=MEMS.plan.turns[4:10], sample_rate=50.0, dwell=5.0, first_dwell=30.0)
+    settings, rng = replace(MEMS, plan=plan), np.random.default_rng(3)
+    record = to_record(simulated(settings, drawn(settings, rng), rng))
+    assert calibrate(record, settings).estimate.status is Status.OK
+    study = ic.study(
+        "imu", latitude="34 deg", gravity=f"{settings.site.gravity} m/s^2", imu={"method": "multiposition"}
+    )
+    columns = {name: record[name].values for name in record.columns}
+    of_force = {name: values for name, values in columns.items() if name.startswith("acc")}
+    units = {"acc": "m/s^2", "gyro": "rad/s"}
+    slow = {name: values[::2] for name, values in columns.items()}
+    for columns_, rate, advised in ((columns, 50.0, True), (of_force, 50.0, False), (slow, 25.0, False)):
+        own = {sensor: unit for sensor, unit in units.items() if f"{sensor}_x" in columns_}
+        found = ic.calibrate(ic.record(columns_, rate=rate, units=own), study).estimate
+        assert found.status is Status.TOO_FEW_INTERVALS
+        assert ("or take `inercal calibrate strapdown`" in found.message) is advised
 
 
 def test_lost_samples_shift_nothing_beyond_u():

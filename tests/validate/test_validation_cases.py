@@ -198,7 +198,7 @@ def test_an_earth_that_turns_backward(monkeypatch, fresh):
 
 def test_an_earth_that_turns_backward_under_a_strapdown_unit(monkeypatch, fresh):
     monkeypatch.setattr("inercal.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
-    assert "strapdown-psins-truth" in red(strapdown.CASES, "strapdown-psins-truth")
+    assert "rests-psins-truth" in red(strapdown.CASES, "rests-psins-truth")
 
 
 def test_a_tool_whose_matrix_is_transposed(monkeypatch, fresh):

@@ -127,7 +127,7 @@ def _late() -> Array:
 
 CASES = (
     Case(
-        "strapdown-psins-truth",
+        "rests-psins-truth",
         "The 31 coefficients of a simulated record are those that were injected, over u",
         "PSINS",
         np.zeros(31),
@@ -135,18 +135,16 @@ CASES = (
         errors_over_u,
     ),
     Case(
-        "strapdown-filter-and-batch",
+        "rests-filter-batch",
         "The error-state filter ends where the batch does, over u",
         "closed form",
         np.zeros(32),
         0.01,
         _by_filter,
     ),
+    Case("rests-frames", "A step has one length in u, in both frames", "closed form", [1.0], 1e-5, _frames),
     Case(
-        "strapdown-frames", "A step has one length in u, in both frames", "closed form", [1.0], 1e-5, _frames
-    ),
-    Case(
-        "strapdown-frames-and-back",
+        "rests-frames-back",
         "Coefficients in the frame lower and back are the same",
         "closed form",
         np.zeros(49),
@@ -154,7 +152,7 @@ CASES = (
         _there_and_back,
     ),
     Case(
-        "strapdown-lever-arm",
+        "rests-lever-arm",
         "At r_xx accelerometer x reads -w^2 r_xx, which comes off",
         "closed form",
         [0.0, 0.0, 9.8],
@@ -163,7 +161,7 @@ CASES = (
         "m/s^2",
     ),
     Case(
-        "strapdown-delay",
+        "rests-delay",
         "A cubic through four running sums shifts means of a cube to rounding",
         "closed form",
         np.zeros(20),
