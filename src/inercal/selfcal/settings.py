@@ -15,7 +15,7 @@ from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quant
 from inercal.selfcal.estimators import FactorKind, FilterKind
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan
-from inercal.selfcal.platform.rig import Base, Gimbals, World, world
+from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 from inercal.selfcal.platform.states import (
     ALL,
     EXTENDED_MODEL,
@@ -194,7 +194,8 @@ class SelfcalSettings:
     """A study of self-calibration, in SI.
 
     ``site`` with its uncertainties; ``gimbals`` and ``base`` the rig, its heading to be found from the record where
-    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name; ``plan`` None where a record is
+    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name, and the angle [rad] of each joint
+    that is ``fixed``, on a rig of one or two axes, and has no encoder; ``plan`` None where a record is
     enough. ``prior`` (24,) standard deviations of the coefficients about 0, in the order of
     `inercal.selfcal.platform.coefficients`; ``truth`` (24,), (K,) with the rig's, or None, product form, for
     simulations; ``goal`` wanted standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
@@ -208,6 +209,7 @@ class SelfcalSettings:
     base: Base = field(default_factory=Base)
     heading_unknown: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
     plan: Plan | None = None
     truth: Array | None = None
     goal: Mapping[str, float] = field(default_factory=dict)
@@ -223,6 +225,16 @@ class SelfcalSettings:
     def world(self) -> World:
         """Earth rate and gravity on the base."""
         return world(self.site, self.base, self.gimbals)
+
+    @property
+    def unread(self) -> tuple[int, ...]:
+        """Joints 0, 1, 2 that are fixed."""
+        return tuple(k for k, name in enumerate(JOINTS) if name in self.fixed)
+
+    @property
+    def fixed_angles(self) -> Array:
+        """(3,) rad, of fixed joints, 0 for the others."""
+        return np.array([self.fixed.get(name, 0.0) for name in JOINTS])
 
     @property
     def kinds(self) -> tuple[str, ...]:

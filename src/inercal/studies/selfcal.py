@@ -45,7 +45,15 @@ from inercal.studies.laboratory import (
     Tolerances,
     traced,
 )
-from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
+from inercal.studies.platform import (
+    GimbalsTable,
+    PlanTable,
+    base_of,
+    fixed_of,
+    gimbals_of,
+    limits_of,
+    plan_of,
+)
 from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
@@ -199,7 +207,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
-    base, limits = base_of(file.rig), limits_of(file.rig, path)
+    base, limits, fixed = base_of(file.rig), limits_of(file.rig, path), fixed_of(file.rig, path)
     return SelfcalSettings(
         site=_site(file.site, path),
         noise=file.noise,
@@ -208,7 +216,8 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         base=base,
         heading_unknown=file.rig.heading == "unknown",
         limits=limits,
-        plan=None if file.plan is None else plan_of(file.plan, limits, path),
+        fixed=fixed,
+        plan=None if file.plan is None else plan_of(file.plan, fixed, path),
         truth=None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances)),
         goal=_wanted(file.goal),
         filter=_filter(file.filter),

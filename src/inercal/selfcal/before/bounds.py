@@ -24,6 +24,7 @@ from inercal.selfcal.filters.problem import (
     FilterModel,
     FilterProblem,
     admitted,
+    apart,
     encoders_at,
     updating,
     watch,
@@ -285,7 +286,14 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                 watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
-                    roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                    roots, _ = encoder_roots(
+                        th[k],
+                        world.axes,
+                        world.signs,
+                        noise.encoder,
+                        noise.joints,
+                        apart(noise, dt[max(k - 1, 0)]),
+                    )
                     wide = encoder_columns(
                         th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                     )

@@ -23,7 +23,15 @@ from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import exp, right_jacobian, rotate
 from inercal.selfcal.before.bounds import Path
 from inercal.selfcal.filters.gaps import anew
-from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
+from inercal.selfcal.filters.problem import (
+    FilterModel,
+    FilterProblem,
+    admitted,
+    apart,
+    encoders_at,
+    updating,
+    watch,
+)
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
     WALK_TIME,
@@ -104,7 +112,7 @@ def _carried(
     full = states.stated.copy()
     full[states.index] = coefficients
     whole = replace(states, names=(*states.names, *names))
-    wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole)
+    wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole, problem.fixed)
     P, S = np.diag(np.append(np.full(3, problem.noise.encoder**2), problem.prior**2)), np.zeros((3 + p, m))
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
@@ -178,7 +186,9 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
             if seen[k, 3]:
-                roots, variances = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                roots, variances = encoder_roots(
+                    th[k], world.axes, world.signs, noise.encoder, noise.joints, apart(noise, dt[k - 1])
+                )
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                 )

@@ -18,7 +18,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Vector
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.selfcal.platform.linearised import empty_columns, encoder_columns
+from inercal.selfcal.platform.linearised import FLOOR, STIFF, empty_columns, encoder_columns
 from inercal.selfcal.platform.model import Rates, encoders_attitude, on_the_base
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import ALL, Layout, StateVector
@@ -83,13 +83,25 @@ def updating(gate: Gate, near: NDArray[np.int64]) -> bool:
 class NoiseLevels(NamedTuple):
     """Standard deviations as kernels take them: ``angle_random_walk`` of the gyros [rad/sqrt(s)], ``accelerometer``
     [m/s^2] and ``encoder`` [rad] of each sample; of biases that walk, about their means, ``gyro_walk`` [rad/s] and
-    ``accelerometer_walk`` [m/s^2]."""
+    ``accelerometer_walk`` [m/s^2]; ``joints`` (3,) variance of each joint's angle over that of an encoder: 1, and of a
+    joint that is fixed, without an encoder, what the sway of the base makes of it."""
 
     angle_random_walk: float
     accelerometer: float
     encoder: float
     gyro_walk: float
     accelerometer_walk: float
+    joints: Array
+
+
+@kernel
+def apart(noise: NoiseLevels, dt: float) -> float:
+    """Variance [rad^2] of an attitude by the encoders about each axis, beside that of the joints' angles: of three
+    joints `LIMITS.encoder_floor` of one, and where joints are fixed a part of what the gyros wander within the ``dt``
+    [s] to the row before, so that the innovations about a fixed joint are the noise of the gyros."""
+    if noise.joints[0] * noise.joints[1] * noise.joints[2] == 1.0:
+        return FLOOR * FLOOR * noise.encoder * noise.encoder
+    return STIFF * noise.angle_random_walk * noise.angle_random_walk * dt
 
 
 class FilterModel(NamedTuple):
@@ -106,7 +118,7 @@ class FilterProblem:
     """The problem of an estimator, without the recording.
 
     ``prior`` (p,) standard deviations of its states about their ``mean`` (p,), in the order of `states`; without a
-    ``vector`` those are the first p of all, p 18 or 24, about 0.
+    ``vector`` those are the first p of all, p 18 or 24, about 0. ``fixed`` joints 0, 1, 2 have no encoder.
     """
 
     world: World
@@ -114,6 +126,7 @@ class FilterProblem:
     prior: Array
     filter: Filter = field(default_factory=Filter)
     vector: StateVector | None = None
+    fixed: tuple[int, ...] = ()
 
     @cached_property
     def states(self) -> StateVector:
@@ -148,6 +161,7 @@ class FilterProblem:
         levels = NoiseLevels(
             float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder),
             noise.gyro_walk_sigma, noise.accelerometer_walk_sigma,
+            np.where(np.isin(np.arange(3), self.fixed), 0.5 * (noise.base_sway / noise.encoder) ** 2, 1.0),
         )  # fmt: skip
         return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
 
@@ -156,7 +170,9 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
     """The problem of a study."""
     vector = settings.states
     noise = settings.noise.of_readings
-    return FilterProblem(settings.world, noise, settings.priors[vector.index], settings.filter, vector)
+    return FilterProblem(
+        settings.world, noise, settings.priors[vector.index], settings.filter, vector, settings.unread
+    )
 
 
 @dataclass(frozen=True, eq=False)

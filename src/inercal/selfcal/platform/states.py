@@ -255,13 +255,22 @@ _TWINS: Final[tuple[Mapping[str, str], ...]] = (
 )
 
 
-def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
-    """Parameters of some kinds that are left out where joints ``fixed`` (0 outer, 1 inner, 2 platform) stand still: a
-    turn between two joints that move not against each other is one of gamma, or of beta."""
-    left = {name for joint in fixed for name, twin in _TWINS[joint].items() if twin in kinds}
-    if len(fixed) > 1 and {"gamma", "beta"} <= {*kinds}:
-        left = {"nonorth_xy", "nonorth_yz", "zero_y"}
-    return tuple(name for name in ALL if name in left and KIND_OF[name] in kinds)
+def twins(kinds: Sequence[str], still: Sequence[int], axes: Sequence[int]) -> dict[str, str]:
+    """Parameters of some kinds that are left out where joints ``still`` (0 outer, 1 inner, 2 platform) do not turn, and
+    the kind that each cannot be told from; ``axes`` (3,) of p that the joints lie along, or nearest to.
+
+    A turn between two joints that move not against each other is one of gamma, or of beta. Where one joint alone turns,
+    a turn about it of all that it carries is one of what carries it: gamma about its axis is left out.
+    """
+    left = {name: twin for joint in still for name, twin in _TWINS[joint].items() if twin in kinds}
+    if len(still) == 2 and {"gamma", "beta"} <= {*kinds}:
+        (moving,) = {0, 1, 2} - {*still}
+        left |= {"nonorth_xy": "beta" if moving else "gamma", "zero_y": "beta"}
+        left |= {
+            "nonorth_yz": "beta" if moving == 2 else "gamma",
+            STATES["gamma"].parameters[axes[moving]]: "beta",
+        }
+    return {name: left[name] for name in ALL if name in left and KIND_OF[name] in kinds}
 
 
 def state_vector(
