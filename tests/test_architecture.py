@@ -167,7 +167,7 @@ WITHIN = {
     ),
     "selfcal": (
         "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
-        "result task figures"
+        "result task several figures"
     ),
 }
 

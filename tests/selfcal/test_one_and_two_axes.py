@@ -16,7 +16,7 @@ from inercal.errors import RecordError, StudyError
 from inercal.geometry.rotations import conjugate, rotate, to_matrix
 from inercal.selfcal.filters.problem import encoders_at, problem
 from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.platform.states import ALL, RIG
 from inercal.selfcal.reading import recording_of
@@ -42,7 +42,7 @@ def of_study(folder, rig, more=""):
 
 
 def drawn(rng):
-    """Coefficients, and errors of a rig, by the priors of `rig`; delays a tenth, as the simulator turns at corners."""
+    """Coefficients, and errors of a rig, by the priors of `rig`; delays of some 0.5 ms."""
 
     def three(size):
         return size * rng.standard_normal(3)
@@ -57,7 +57,7 @@ def drawn(rng):
 
 @pytest.mark.parametrize("rig", FIXED)
 def test_uncertainties_hold_without_an_encoder_on_a_fixed_joint(rig, tmp_path):
-    """NEES of the gyros' and accelerometers' coefficients over 20 draws, within limits that 1 in 10000 leaves."""
+    """NEES of the coefficients and delays over 20 draws, within limits that 1 in 10000 leaves."""
     asked, rng, total = of_study(tmp_path, rig), np.random.default_rng(20261124), 0.0
     drive, file = Drive(TURNS[rig]), tmp_path / "record.csv"
     for _ in range(20):
@@ -67,11 +67,14 @@ def test_uncertainties_hold_without_an_encoder_on_a_fixed_joint(rig, tmp_path):
         recording = recording_of(ic.read(file), settings)
         of = problem(without_fixed(settings)[0])
         found = estimate(recording, of, history=False)
-        error = (
-            found.coefficients[:21] - to_linear(np.concatenate([truth, faults.gyro_scale, faults.base]))[:21]
+        true = dict(
+            zip(EXTENDED, to_linear(np.concatenate([truth, faults.gyro_scale, faults.base])), strict=True)
         )
-        total += error @ np.linalg.solve(found.covariance[:21, :21], error)
-    low, high = chi2.ppf([5e-5, 1 - 5e-5], 20 * 21)
+        true |= {"tau_enc": faults.delay_encoder, "tau_a": faults.delay_accelerometer}
+        told = [k for k, name in enumerate(of.names) if name in true and not name.startswith("beta")]
+        error = found.coefficients[told] - [true[of.names[k]] for k in told]
+        total += error @ np.linalg.solve(found.covariance[np.ix_(told, told)], error)
+    low, high = chi2.ppf([5e-5, 1 - 5e-5], 20 * 23)
     assert low < total < high
 
 

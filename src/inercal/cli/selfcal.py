@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError
+from inercal.errors import InputError, StudyError
 from inercal.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
@@ -90,6 +90,8 @@ def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> E
     from inercal.selfcal.still_joints import without_fixed
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
 
+    if settings.placed:
+        raise StudyError("records", "found records on bases of their own, expected one base for a stream")
     stated_well(settings, "a stream")
     settings, left_out = without_fixed(settings)
     of = problem(settings)

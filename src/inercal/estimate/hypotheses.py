@@ -309,6 +309,8 @@ def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquar
     weight = math.sqrt(max(1.0, square / max(count, 1))) / prior
     normal, right = normal + np.diag(weight**2), right + weight**2 * values
     square += float(np.square(weight * values).sum())
+    if not (np.isfinite(normal).all() and np.isfinite(right).all()):  # a case that is lost
+        return LeastSquares(np.zeros(m), np.full(m, np.inf), math.inf, 0.0)
     size = np.sqrt(np.diag(normal))
     without = size == 0.0
     size[without] = 1.0

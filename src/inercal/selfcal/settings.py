@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any, Literal
 
 import numpy as np
@@ -188,6 +189,26 @@ class Search:
     seed: int = option("of the random starts", 1, least=0)
 
 
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A record with a base of its own: its ``file`` as typed, the ``base``, unknown in heading where
+    ``heading_unknown``, and the ``prior`` (24,) of the coefficients with that of the base."""
+
+    file: str
+    base: Base
+    heading_unknown: bool
+    prior: Array
+
+    def names(self, path: str) -> bool:
+        """True for the path of that file."""
+        own = PurePath(self.file).parts
+        return PurePath(path).parts[-len(own) :] == own
+
+    def of(self, settings: SelfcalSettings) -> SelfcalSettings:
+        """The study with that base."""
+        return replace(settings, base=self.base, heading_unknown=self.heading_unknown, prior=self.prior)
+
+
 @short_repr
 @dataclass(frozen=True, eq=False)
 class SelfcalSettings:
@@ -198,7 +219,8 @@ class SelfcalSettings:
     that is ``fixed``, on a rig of one or two axes, and has no encoder; ``plan`` None where a record is
     enough. ``prior`` (24,) standard deviations of the coefficients about 0, in the order of
     `inercal.selfcal.platform.coefficients`; ``truth`` (24,), (K,) with the rig's, or None, product form, for
-    simulations; ``goal`` wanted standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
+    simulations; ``goal`` wanted standard uncertainty [SI] by name;
+    ``placed`` the bases of several records. ``traceability``, ``temperature``, ``given`` as in
     `inercal.imu.settings.ImuSettings`.
     """
 
@@ -217,6 +239,7 @@ class SelfcalSettings:
     model: Model = field(default_factory=Model)
     disturbances: Disturbances = field(default_factory=Disturbances)
     search: Search = field(default_factory=Search)
+    placed: tuple[Placed, ...] = ()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
@@ -263,7 +286,7 @@ class SelfcalSettings:
         stated = np.zeros(len(ALL))
         for name, (value, _) in self.model.stated.items():
             stated[ALL.index(name)] = value
-        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics)
+        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics, self.unread)
 
     @property
     def priors(self) -> Array:

@@ -115,6 +115,20 @@ class GimbalsTable(Strict):
     )
 
 
+class PlacedRecordTable(Strict):
+    """A record of a platform on a base of its own; several are fitted together."""
+
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="of the record, as the command is given it", examples=["south.csv"]
+    )
+    heading: Angle | Literal["unknown"] | None = Field(
+        default=None, description="of the base, from north to east; that of [rig] if absent"
+    )
+    tilt: Annotated[Several, _TILT] | None = Field(
+        default=None, description="of the base, about north and about east; that of [rig] if absent"
+    )
+
+
 def gimbals_of(table: GimbalsTable) -> Gimbals:
     """Order and signs."""
     x, y, z = table.gimbals
@@ -122,11 +136,13 @@ def gimbals_of(table: GimbalsTable) -> Gimbals:
     return Gimbals((x, y, z), (outer, inner, platform))
 
 
-def base_of(table: GimbalsTable) -> Base:
-    """Attitude of the base."""
-    heading = None if table.heading == "unknown" else table.heading
-    north, east = (0.0, 0.0) if table.tilt is None else table.tilt.values
-    tilt_u = (0.0, 0.0) if table.tilt is None else tuple(each.u for each in table.tilt.quantities)
+def base_of(table: GimbalsTable, record: PlacedRecordTable | None = None) -> Base:
+    """Attitude of the base, that of a ``record`` where it states another."""
+    typed = table.heading if record is None or record.heading is None else record.heading
+    tilt = table.tilt if record is None or record.tilt is None else record.tilt
+    heading = None if typed == "unknown" else typed
+    north, east = (0.0, 0.0) if tilt is None else tilt.values
+    tilt_u = (0.0, 0.0) if tilt is None else tuple(each.u for each in tilt.quantities)
     return Base(
         table.frame,
         0.0 if heading is None else heading.value,

@@ -23,6 +23,7 @@ from inercal.selfcal.settings import (
     Filter,
     Gating,
     Noise,
+    Placed,
     Search,
     SelfcalSettings,
 )
@@ -47,6 +48,7 @@ from inercal.studies.laboratory import (
 )
 from inercal.studies.platform import (
     GimbalsTable,
+    PlacedRecordTable,
     PlanTable,
     base_of,
     fixed_of,
@@ -174,6 +176,12 @@ class SelfcalStudyFile(Strict):
     version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
     rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
+    records: list[PlacedRecordTable] = Field(
+        default=[],
+        title="Records",
+        description="records on bases of their own, fitted together; one base for all if absent",
+        examples=[[{"file": "south.csv", "heading": "180 deg"}]],
+    )
     plan: PlanTable | None = Field(
         default=None, title="Plan", description="the path; a recording can do without"
     )
@@ -224,10 +232,18 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         model=model_of(file.model, file.filter, path),
         disturbances=_disturbances(file.disturbances),
         search=file.design,
+        placed=tuple(_placed(each, file) for each in file.records),
         traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
+
+
+def _placed(table: PlacedRecordTable, file: SelfcalStudyFile) -> Placed:
+    """A record with its base."""
+    base = base_of(file.rig, table)
+    typed = file.rig.heading if table.heading is None else table.heading
+    return Placed(table.file, base, typed == "unknown", _prior(file.prior, base))
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:

@@ -57,7 +57,7 @@ from inercal.selfcal.platform.model import (
     specific_force,
 )
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, WALK, Layout
+from inercal.selfcal.platform.states import ALL, WALK
 
 
 def sensitivities(
@@ -112,13 +112,15 @@ def _carried(
     full = states.stated.copy()
     full[states.index] = coefficients
     whole = replace(states, names=(*states.names, *names))
-    wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole, problem.fixed)
+    wide = FilterProblem(problem.world, problem.noise, np.ones(p + m), problem.filter, whole)
     P, S = np.diag(np.append(np.full(3, problem.noise.encoder**2), problem.prior**2)), np.zeros((3 + p, m))
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     warm = np.zeros(len(q)) if recording.warm is None else recording.warm
     first, room = 0, np.zeros((_CHUNK if take else 0, 6, m))
-    model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
+    model = problem.model._replace(
+        layout=whole.layout._replace(chosen=states.index, place=place, stated=full)
+    )
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         begin = first
@@ -187,7 +189,12 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
         if updating(gate, near):
             if seen[k, 3]:
                 roots, variances = encoder_roots(
-                    th[k], world.axes, world.signs, noise.encoder, noise.joints, apart(noise, dt[k - 1])
+                    th[k],
+                    world.axes,
+                    world.signs,
+                    noise.encoder,
+                    noise.joints,
+                    apart(noise, dt[k - 1], noise.encoder),
                 )
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns

@@ -225,7 +225,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         if history:
@@ -248,7 +248,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 signs,
                 sigma,
                 noise.joints,
-                apart(noise, dt),
+                apart(noise, dt, sigma),
                 P,
                 x,
                 columns,

@@ -194,7 +194,7 @@ def _advance(
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
-            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         total, count = 0.0, 0
@@ -217,7 +217,7 @@ def _advance(
                 signs,
                 sigma,
                 noise.joints,
-                apart(noise, dt),
+                apart(noise, dt, sigma),
                 P,
                 x,
                 of_states,

@@ -18,7 +18,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Vector
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.selfcal.platform.linearised import FLOOR, STIFF, empty_columns, encoder_columns
+from inercal.selfcal.platform.linearised import AXES, FLOOR, STIFF, empty_columns, encoder_columns
 from inercal.selfcal.platform.model import Rates, encoders_attitude, on_the_base
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import ALL, Layout, StateVector
@@ -95,13 +95,14 @@ class NoiseLevels(NamedTuple):
 
 
 @kernel
-def apart(noise: NoiseLevels, dt: float) -> float:
-    """Variance [rad^2] of an attitude by the encoders about each axis, beside that of the joints' angles: of three
-    joints `LIMITS.encoder_floor` of one, and where joints are fixed a part of what the gyros wander within the ``dt``
-    [s] to the row before, so that the innovations about a fixed joint are the noise of the gyros."""
+def apart(noise: NoiseLevels, dt: float, sigma: float) -> float:
+    """Variance [rad^2] of an attitude by the encoders about each axis, beside that of the joints' angles, of standard
+    deviation ``sigma`` [rad]: of three joints `LIMITS.encoder_floor` of the encoders' noise. Where joints are fixed, it
+    is a part of what the gyros wander within the ``dt`` [s] to the row before, so that the innovations about a fixed
+    joint are the noise of the gyros, and what an axis that is not quite known makes of sigma."""
     if noise.joints[0] * noise.joints[1] * noise.joints[2] == 1.0:
-        return FLOOR * FLOOR * noise.encoder * noise.encoder
-    return STIFF * noise.angle_random_walk * noise.angle_random_walk * dt
+        return FLOOR * FLOOR * sigma * sigma
+    return STIFF * noise.angle_random_walk * noise.angle_random_walk * dt + AXES * AXES * sigma * sigma
 
 
 class FilterModel(NamedTuple):
@@ -118,7 +119,7 @@ class FilterProblem:
     """The problem of an estimator, without the recording.
 
     ``prior`` (p,) standard deviations of its states about their ``mean`` (p,), in the order of `states`; without a
-    ``vector`` those are the first p of all, p 18 or 24, about 0. ``fixed`` joints 0, 1, 2 have no encoder.
+    ``vector`` those are the first p of all, p 18 or 24, about 0.
     """
 
     world: World
@@ -126,7 +127,6 @@ class FilterProblem:
     prior: Array
     filter: Filter = field(default_factory=Filter)
     vector: StateVector | None = None
-    fixed: tuple[int, ...] = ()
 
     @cached_property
     def states(self) -> StateVector:
@@ -161,7 +161,7 @@ class FilterProblem:
         levels = NoiseLevels(
             float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder),
             noise.gyro_walk_sigma, noise.accelerometer_walk_sigma,
-            np.where(np.isin(np.arange(3), self.fixed), 0.5 * (noise.base_sway / noise.encoder) ** 2, 1.0),
+            np.where(self.states.layout.turning, 1.0, 0.5 * (noise.base_sway / noise.encoder) ** 2),
         )  # fmt: skip
         return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
 
@@ -170,9 +170,7 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
     """The problem of a study."""
     vector = settings.states
     noise = settings.noise.of_readings
-    return FilterProblem(
-        settings.world, noise, settings.priors[vector.index], settings.filter, vector, settings.unread
-    )
+    return FilterProblem(settings.world, noise, settings.priors[vector.index], settings.filter, vector)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +188,7 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
     world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
     w, earth, up = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full), on_the_base(world.up, full)
     read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, up, full, layout.waves, world.axes, world.signs)
+    q = encoders_attitude(th, read, earth, up, full, layout, world.axes, world.signs)
     columns = empty_columns()
     count = encoder_columns(th, q, read, earth, up, full, layout, world.axes, world.signs, columns)
     slope = np.zeros((3, len(c)))

@@ -71,7 +71,7 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
     noise = problem.model.noise
-    floor = np.array([apart(noise, dt) for dt in recording.dt])[:, None, None]
+    floor = np.array([apart(noise, dt, noise.encoder) for dt in recording.dt])[:, None, None]
     of_joints = noise.encoder**2 * joints * noise.joints @ np.swapaxes(joints, 1, 2)
     root = np.asarray(np.linalg.cholesky(of_joints + floor * np.eye(3)), dtype=np.float64)
     return Measurements(

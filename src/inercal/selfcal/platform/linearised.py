@@ -28,6 +28,7 @@ from inercal.selfcal.platform.kinematics import Axes, elementary, joint_axes, un
 from inercal.selfcal.platform.model import (
     Rates,
     Sensing,
+    about_turning,
     centripetal,
     platform_rate,
     rate_at,
@@ -56,6 +57,9 @@ FLOOR = LIMITS.encoder_floor
 
 STIFF = LIMITS.stiff_share
 """As kernels take it."""
+
+AXES = LIMITS.axes_known
+"""As kernels take it [rad]."""
 
 WALK_TIME = LIMITS.walk_time
 """As kernels take it [s]."""
@@ -267,7 +271,8 @@ def encoder_columns(
     for i in range(3):
         count = put(columns, count, place[SAG + i], cross(unit(i, 1.0), f), 1.0)
     w, v = platform_rate(rate_at(read, c[TAU]), c), rotate(to_p, earth)
-    return put(columns, count, place[TAU], (w[0] - v[0], w[1] - v[1], w[2] - v[2]), 1.0)
+    late = about_turning((w[0] - v[0], w[1] - v[1], w[2] - v[2]), th, layout.turning, axes, signs)
+    return put(columns, count, place[TAU], late, 1.0)
 
 
 @kernel

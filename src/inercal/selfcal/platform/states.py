@@ -187,22 +187,25 @@ kg0, ka0, ka1; of harmonics a sine and a cosine of each; of walks gyros, acceler
 class Layout(NamedTuple):
     """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
     in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states; ``waves``
-    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0."""
+    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0; ``turning`` (3,) true of
+    joints that are not fixed."""
 
     chosen: NDArray[np.int64]
     place: NDArray[np.int64]
     stated: Array
     waves: NDArray[np.int64]
+    turning: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class StateVector:
-    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, and joint and
-    order of each of the ``harmonics``."""
+    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, joint and
+    order of each of the ``harmonics``; joints 0, 1, 2 that are ``fixed`` and have no encoder."""
 
     names: tuple[str, ...]
     stated: Array
     harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
+    fixed: tuple[int, ...] = ()
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -219,7 +222,9 @@ class StateVector:
         slots = slice(WAVE, WAVE + 2 * len(self.harmonics))
         used = (place[slots] >= 0).any() or self.stated[slots].any()
         waves = np.array(self.harmonics if used else (), dtype=np.int64).reshape(-1, 2)
-        return Layout(index, place, self.stated[:size].copy(), waves)
+        return Layout(
+            index, place, self.stated[:size].copy(), waves, np.isin(np.arange(3), self.fixed, invert=True)
+        )
 
     def full(self, c: Array) -> Array:
         """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
@@ -278,8 +283,10 @@ def state_vector(
     stated: Array | None = None,
     left_out: Sequence[str] = (),
     harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES,
+    fixed: tuple[int, ...] = (),
 ) -> StateVector:
-    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named."""
+    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named, of
+    a rig with joints that are ``fixed``."""
     without = {*left_out, *ALL[WAVE + 2 * len(harmonics) : WALK]}
     names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in without)
-    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics)
+    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics, fixed)
