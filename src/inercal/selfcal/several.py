@@ -302,7 +302,7 @@ def _stated(parts: Sequence[Part], fit: Fit, u: Array, slope: Array) -> tuple[li
         own = filtering.estimate(part.recording, part.problem, courses=False)
         known = np.sqrt(np.diag(own.covariance))
         known[fit.common] = u
-        of_site, of_site_exact = systematic(part.recording, part.settings, known)
+        of_site, of_site_exact = systematic(part.recording, part.settings, own, known)
         of_rig, of_rig_exact = considered(part.recording, part.settings, own, known)
         exact |= {key: text for key, text in {**of_site_exact, **of_rig_exact}.items() if key not in exact}
         weight = fit.covariance @ _inverse(own.covariance[np.ix_(fit.common, fit.common)], 1.0 / fit.prior)

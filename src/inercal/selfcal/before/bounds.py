@@ -233,9 +233,11 @@ def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -
             for i in range(m):
                 gain[i] = own[i] / inner
         for i in range(m):
-            for k in range(i + 1):
-                P[s, i, k] += gain[i] * inner * gain[k] - gain[i] * own[k] - own[i] * gain[k]
-                P[s, k, i] = P[s, i, k]
+            own[i] -= 0.5 * inner * gain[i]
+        for i in range(m):
+            by_gain, by_own = gain[i], own[i]
+            for k in range(m):
+                P[s, i, k] -= by_gain * own[k] + by_own * gain[k]  # symmetric to the last digit
 
 
 class Path(NamedTuple):
