@@ -21,7 +21,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import exp, right_jacobian, rotate
-from inercal.selfcal.before.bounds import Path
+from inercal.selfcal.before.bounds import Path, arrived
 from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.problem import (
     FilterModel,
@@ -40,19 +40,17 @@ from inercal.selfcal.platform.linearised import (
     Places,
     Step,
     accelerometer_row,
+    decorrelated_row,
     dynamics_columns,
     empty_columns,
     encoder_columns,
     encoder_roots,
+    encoder_row,
     propagate_covariance,
     wander,
 )
 from inercal.selfcal.platform.model import (
-    Rates,
-    drifting,
-    force_within,
     on_the_base,
-    platform_rate,
     sensing,
     specific_force,
 )
@@ -151,7 +149,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
     """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
     whole full vector, linear form; in the layout considered states have the places behind the n. ``slopes`` (rows, 6,
     m), or none, receive those of the normalised innovations."""
-    q, th, dt, w, measured, warm = path
+    q, th, measured, warm = path.q, path.th, path.measured, path.warm
     world, noise, gate, layout = model
     n, place = len(P), layout.place
     own = place.copy()
@@ -163,12 +161,8 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
     earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(1, len(q)):
-        at, following = (q[k, 0], q[k, 1], q[k, 2], q[k, 3]), min(k, len(w) - 1)
-        commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
-        read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-        force = force_within(at, commanded, -0.5 * dt[k - 1], up_e)
-        rate = drifting(platform_rate(commanded, c), force, warm[k], c)
-        step = Step(commanded, rate, earth_e, at, dt[k - 1], force, warm[k])
+        step, read = arrived(path, k, c, earth_e, up_e)
+        at = step.attitude
         _carry_step(S, n, c, place, step, shift, columns)
         walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
         propagate_covariance(P, c, own, step, walk, top, columns)
@@ -190,19 +184,11 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                 )
                 for i in range(3 if len(slopes) > 0 else 0):
-                    row.places[0], row.values[0] = i, 1.0
-                    for a in range(wide):
-                        row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
-                    _shown(P, S, row, 1 + wide, variances[i], slopes[k, 3 + i])
+                    size = encoder_row(i, columns, wide, row)
+                    _shown(P, S, row, size, variances[i], slopes[k, 3 + i])
                 for i in range(3):
-                    root = roots[i]
-                    for j in range(i + 1):
-                        row.places[j], row.values[j] = j, root[j]
-                    for a in range(wide):
-                        x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
-                        row.places[1 + i + a] = columns.places[a]
-                        row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
-                    _update(P, S, row, i + 1 + wide, 1.0, gain, shift[0])
+                    size = decorrelated_row(i, roots[i], columns, wide, row)
+                    _update(P, S, row, size, 1.0, gain, shift[0])
             sensed = sensing(at, read, earth_e, up_e, warm[k], c)
             for i in range(3 if len(slopes) > 0 else 0):
                 if measured[k, i] and admitted(i, gate, near):
