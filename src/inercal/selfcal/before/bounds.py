@@ -303,7 +303,7 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                         world.signs,
                         noise.encoder,
                         noise.joints,
-                        apart(noise, dt[max(k - 1, 0)], noise.encoder),
+                        apart(noise, step.dt, noise.encoder),
                     )
                     wide = encoder_columns(
                         th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns

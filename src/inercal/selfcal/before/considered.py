@@ -178,7 +178,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
                     world.signs,
                     noise.encoder,
                     noise.joints,
-                    apart(noise, dt[k - 1], noise.encoder),
+                    apart(noise, step.dt, noise.encoder),
                 )
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
