@@ -65,10 +65,20 @@ class Noise:
         example="2 arcsec", bounds=within(0.0, math.inf, "an angle of 0 or more"),
     )  # fmt: skip
 
+    vibration: float = quantity(
+        "root mean square along each axis, faster than the rows, noise to the accelerometers", "acceleration", "0 ug",
+        example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
+    )  # fmt: skip
+
     @property
     def of_readings(self) -> Noise:
-        """The same with the sway of the base in the noise of the encoders, which read angles against it."""
-        return replace(self, encoder=math.hypot(self.encoder, self.base_sway / math.sqrt(2.0)))
+        """The same with the sway of the base in the noise of the encoders, which read angles against it, and its
+        vibration in that of the accelerometers."""
+        return replace(
+            self,
+            encoder=math.hypot(self.encoder, self.base_sway / math.sqrt(2.0)),
+            accelerometer=math.hypot(self.accelerometer, self.vibration),
+        )
 
     @property
     def gyro_walk_sigma(self) -> float:
@@ -170,6 +180,10 @@ class Disturbances:
     lost_rows: float = quantity(
         "part of the rows that are not in the file", "number", "0", example="1 %", bounds=PART
     )
+    vibration: float = quantity(
+        "root mean square along each axis, of many frequencies above those of the rows", "acceleration", "0 ug",
+        example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
+    )  # fmt: skip
     base_sway: tuple[float, float] = (0.0, 0.0)
     substeps: int = 10
 

@@ -100,6 +100,8 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     n, step = len(t), float(t[1] - t[0])
     rate, q, acc, read, th = (_driven if experiment.fixed else _commanded)(experiment, rng)
     acc += noise.accelerometer * rng.standard_normal((n, 3))
+    if other.vibration > 0.0:  # sampled more slowly than it is
+        acc += other.vibration * rng.standard_normal((n, 3))
     if other.accelerometer_walk > 0.0:
         acc += wandering(other.accelerometer_walk, step, n, rng)
     if other.flicker > 0.0:
