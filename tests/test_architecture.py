@@ -166,7 +166,8 @@ WITHIN = {
         "simulate design task runs figures"
     ),
     "selfcal": (
-        "estimators limits platform settings filters before diagnosis find_base monte_carlo reading result task figures"
+        "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
+        "result task several figures"
     ),
 }
 

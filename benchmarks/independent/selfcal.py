@@ -270,15 +270,17 @@ class Record:
     temperature: np.ndarray
     measured: bool
 
-    def write(self, path) -> None:
-        """A CSV file with units in its header."""
+    def write(self, path, without=()) -> None:
+        """A CSV file with units in its header, ``without`` the columns of some names."""
         sensor = "gyro" if self.measured else "wc"
         titles = ["t [s]", *(f"{sensor}_{i} [deg/h]" for i in "xyz"), *(f"th_{i} [deg]" for i in "xyz"),
                   *(f"acc_{i} [m/s^2]" for i in "xyz"), "temperature [degC]"]  # fmt: skip
         rows = np.column_stack(
             [self.t, self.rate / DEG_H, np.degrees(self.th), self.acc, self.temperature[:, None]]
         )
-        np.savetxt(path, rows, delimiter=",", header=",".join(titles), comments="", fmt="%.13g")
+        kept = [k for k, title in enumerate(titles) if title.split(" ")[0] not in without]
+        titles = [titles[k] for k in kept]
+        np.savetxt(path, rows[:, kept], delimiter=",", header=",".join(titles), comments="", fmt="%.13g")
 
 
 def earth_and_up(faults: Faults):

@@ -32,6 +32,8 @@ SLOW = [
     "docs/how-to/on-a-table-with-known-angles.md",
     "docs/how-to/poses-or-turns.md",
     "docs/how-to/read-your-files.md",
+    "docs/how-to/rig-of-two-axes.md",
+    "docs/how-to/several-records.md",
     "docs/how-to/temperature.md",
     "docs/how-to/tolerances-from-a-goal.md",
     "docs/how-to/validate.md",

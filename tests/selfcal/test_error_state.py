@@ -221,7 +221,8 @@ def test_encoder_covariance_is_that_of_small_angle_errors():
     q = np.array(attitude(th, rig.index, rig.sign))
     drawn = th + sigma * rng.standard_normal((20000, 3))
     miss = np.array([boxminus(np.array(attitude(each, rig.index, rig.sign)), q) for each in drawn])
-    roots, variances = linearised.encoder_roots(th, rig.index, rig.sign, sigma)
+    floor = (linearised.FLOOR * sigma) ** 2
+    roots, variances = linearised.encoder_roots(th, rig.index, rig.sign, sigma, np.ones(3), floor)
     L = np.linalg.inv(np.array(roots))
     stated = L @ L.T - (linearised.FLOOR * sigma) ** 2 * np.eye(3)
     assert np.diag(L @ L.T) == pytest.approx(np.array(variances))

@@ -19,9 +19,9 @@ from inercal.selfcal.platform.coefficients import to_linear, to_product
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import Gimbals
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, RIG, STATES, TEMPERATURE, WALK
-from inercal.selfcal.reading import told_apart
 from inercal.selfcal.result.outcome import assemble
 from inercal.selfcal.settings import Model
+from inercal.selfcal.still_joints import still_joints, told_apart
 
 WHOLE = (
     *RIG, "k2", "levers", "scale_asymmetry", "g_sensitivity", "sag", *TEMPERATURE, "harmonics", *BIAS_WALK,
@@ -395,14 +395,19 @@ def test_what_is_stated_but_not_estimated_enters_u():
     assert "gamma" not in told.split(" are no states")[0]
 
 
+def told(settings, th):
+    """What is left of the states along a path."""
+    return told_apart(settings, still_joints(settings, th), th[0])
+
+
 def test_joints_that_stand_still_leave_states_out():
     th = np.zeros((10, 3))
     th[:, 0] = np.linspace(0.0, 1.0, 10)
     th[:, 2] = np.linspace(0.0, 2.0, 10)
-    settings, said = told_apart(replace(BASE, model=Model(RIG)), th)
+    settings, said = told(replace(BASE, model=Model(RIG)), th)
     assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
     assert len(settings.states.names) == 30
     assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
-    assert told_apart(BASE, th) == (BASE, ())
+    assert told(BASE, th) == (BASE, ())
     th[:, 1] = np.linspace(0.0, 0.5, 10)
-    assert told_apart(replace(BASE, model=Model(RIG)), th)[1] == ()
+    assert told(replace(BASE, model=Model(RIG)), th)[1] == ()

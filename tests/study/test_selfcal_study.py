@@ -3,7 +3,9 @@
 import copy
 import json
 import math
+import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
 from inercal.errors import StudyError
 from inercal.instruments.terms import term
+from inercal.selfcal.before.path_design import design
+from inercal.selfcal.before.simulate import experiment
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
@@ -249,7 +253,8 @@ REFUSED = {
     "rig.signs=[1, 1, true]": "rig.signs: .*three of 1 and -1",
     'rig.tilt=["1 deg"]': "rig.tilt: .*about north",
     'rig.limits.x=["0 deg", "-1 deg"]': "rig.limits.x: .*the lower end first",
-    'rig.limits.z=["-10 deg", "10 deg"]': "plan: found turns that take th_z beyond rig.limits, .*-10 deg to 10 deg",
+    'rig.fixed.z="0 deg"': "plan: found a turn of th_z, expected none of a joint of rig.fixed",
+    'rig.fixed.w="0 deg"': "rig.fixed.w: unknown key",
     'rig.limits.th_x=["0 deg", "1 deg"]': "rig.limits.th_x: unknown key",
     "rig.heading=north": "rig.heading: found 'north', expected a quantity",
     "rig.frame=NED": "rig.frame: found 'NED', expected 'nue', 'enu' or 'ned'",
@@ -415,3 +420,16 @@ def test_states_are_those_of_the_rig_where_the_estimator_has_them(kind):
 
 def test_the_table_of_terms_knows_every_coefficient_with_its_unit():
     assert tuple(term(name).unit_for("rad/s") for name in ALL) == units(ALL)
+
+
+def test_a_plan_beyond_the_limits_can_be_searched_from_but_not_simulated():
+    limits = {"z": ["-10 deg", "10 deg"]}
+    asked = rig(limits=limits)
+    with pytest.raises(
+        StudyError, match=r"plan: found turns that take th_z beyond rig\.limits, .*-10 deg to 10"
+    ):
+        experiment(replace(asked, truth=np.zeros(24)))
+    near = replace(asked, search=replace(asked.search, turns=2, angle=np.pi / 2))
+    table = design(near).table()
+    assert re.search(r"^study .*; beyond the limits of th_z$", table, re.MULTILINE)
+    assert not re.search(r"^found .*beyond", table, re.MULTILINE)

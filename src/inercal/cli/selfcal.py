@@ -11,12 +11,13 @@ from cyclopts import Parameter
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError
+from inercal.errors import InputError, StudyError
 from inercal.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
     from inercal.selfcal.settings import SelfcalSettings
+    from inercal.stream.lines import Lines
 
 
 def selfcal(
@@ -85,11 +86,23 @@ def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> E
     from inercal._jit import compiling
     from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.find_base import stated_well
+    from inercal.selfcal.reading import as_recorded
+    from inercal.selfcal.still_joints import without_fixed
     from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
 
+    if settings.placed:
+        raise StudyError("records", "found records on bases of their own, expected one base for a stream")
     stated_well(settings, "a stream")
+    settings, left_out = without_fixed(settings)
     of = problem(settings)
     filter_of(of)
+    for finding in left_out:
+        output.say_finding(finding)
     with compiling(f"selfcal stream {of.filter.kind}", output.say):
         load_kernels(of)
-    return lambda lines: Selfcal(lines, of, interval, output.say_finding)
+
+    def estimator(lines: Lines) -> Selfcal:
+        of_stream = as_recorded(lines.record, settings)
+        return Selfcal(lines, problem(of_stream), interval, output.say_finding, of_stream.fixed)
+
+    return estimator

@@ -7,29 +7,40 @@ it to turn at a wanted rate the command is
 
 of which the familiar ``w_p - M w_p - kg0`` is the first order: that leaves M (M w_p + kg0), at 1 deg/s and
 misalignments of 100 arcsec 0.001 deg/h, as much as a good calibration still sees, so the inverse is taken. Gyros that
-took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured.
+took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured. Where the result
+has drift by force, sag, temperature, squares of accelerometers or asymmetry of scales, these are corrected for too
+(`inercal.convert.platform_rig`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert.correction import Correction, Samples
+from inercal.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.convert.platform_rig import BY_FORCE, BY_TEMPERATURE, RigPlatform
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
 from inercal.instruments.triad import TriadModel
 from inercal.records.record import Record
 from inercal.selfcal.platform.coefficients import NAMES
+from inercal.selfcal.platform.states import KIND_OF
+from inercal.units import parse_unit
 
 COMMAND = "selfcal"
 """Command whose estimates are of a platform."""
 
 _WORST = 1e6
 """Condition number beyond which a gain is not inverted; a platform has one near 1."""
+
+#: kinds of coefficients that are of angles, times and places
+_UNAPPLIED = (
+    "gamma", "non_orthogonality", "zero_y", "delay", "levers", "harmonics", "gyro_walk", "accelerometer_walk",
+)  # fmt: skip
 
 #: sensor -> dimension of its channels
 _SENSORS = {"wc": "rate", "gyro": "rate", "acc": "acceleration"}
@@ -39,11 +50,14 @@ _SENSORS = {"wc": "rate", "gyro": "rate", "acc": "acceleration"}
 class PlatformModel:
     """The platform that a self-calibration describes, in SI.
 
-    ``platform`` takes commanded rates to those at which it turns, ``accelerometer`` specific force to outputs.
+    ``platform`` takes commanded rates to those at which it turns, ``accelerometer`` specific force to outputs; ``rig``
+    has what is beside these, at ``temperature`` [degC] nothing by temperature, None where that is not known.
     """
 
     platform: TriadModel
     accelerometer: TriadModel
+    rig: RigPlatform
+    temperature: float | None = None
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record, whose columns may be without samples yet; all keep their units.
@@ -65,30 +79,73 @@ class PlatformModel:
                     triad.source.path,
                     f"{triad.sensor} is in {triad.unit.symbol}, expected a unit of {dimension}",
                 )
-        forward, back = self.platform.indicate, self.platform.correct
-        acc = self.accelerometer
-        works = {
-            "wc": forward if invert else back,
-            "gyro": back if invert else forward,
-            "acc": acc.indicate if invert else acc.correct,
-        }
         units = {triad.sensor: triad.unit for triad in triads}
         columns = [(sensor, f"{sensor}_{axis}") for sensor in units for axis in "xyz"]
+        warm, left_out = self._beside(record, units.keys())
+        clock = [name for _, name in columns]
+        if warm:
+            one_clock(record, [*clock, "temperature"])
+        elif not self.rig.linear and "acc" in units:
+            one_clock(record, clock)
 
         def work(samples: Samples) -> Samples:
+            given = {
+                sensor: np.stack([samples[f"{sensor}_{axis}"] for axis in "xyz"], axis=-1) for sensor in units
+            }
+            above = samples["temperature"] - (self.temperature or 0.0) if warm else np.zeros(())
             results: dict[str, Array] = {}
-            for sensor, unit in units.items():
-                x = np.stack([samples[f"{sensor}_{axis}"] for axis in "xyz"], axis=-1)
-                corrected = works[sensor](x) / unit.factor
-                results |= {f"{sensor}_{axis}": corrected[..., i] for i, axis in enumerate("xyz")}
+            for sensor, corrected in self._worked(given, above[..., None], invert).items():
+                in_unit = corrected / units[sensor].factor
+                results |= {f"{sensor}_{axis}": in_unit[..., i] for i, axis in enumerate("xyz")}
             return results
 
+        reads = {name: (units[sensor].factor, 0.0) for sensor, name in columns}
         return Correction(
             work,
-            {name: (units[sensor].factor, 0.0) for sensor, name in columns},
+            reads
+            | ({"temperature": factor_of(record["temperature"], parse_unit("degC"), "")} if warm else {}),
             {name: (name, units[sensor]) for sensor, name in columns},
-            {"platform": self.platform, "acc": self.accelerometer, "invert": invert},
+            {"platform": self.platform, "acc": self.accelerometer, "invert": invert}
+            | ({} if self.rig.linear else {"rig": self.rig, "warm": warm}),
+            findings=left_out,
         )
+
+    def _beside(self, record: Record, sensors: Collection[str]) -> tuple[bool, tuple[Finding, ...]]:
+        """True where the temperature of a record counts; findings on what it lacks."""
+        column = record.columns.get("temperature")
+        known = column is not None and column.unit.dimension == "temperature" and self.temperature is not None
+        by_temperature, by_force = self.rig.needs(BY_TEMPERATURE), self.rig.needs(BY_FORCE)
+        texts = []
+        if by_temperature and not known:
+            texts.append(f"{', '.join(by_temperature)} are not applied: the record has no temperature")
+        if by_force and "acc" not in sensors:
+            texts.append(
+                f"{', '.join(by_force)} are not applied: the record has no specific force acc_x to z"
+            )
+        return bool(by_temperature) and known, tuple(Finding("not_held", text) for text in texts)
+
+    def _worked(self, given: Mapping[str, Array], warm: Array, invert: bool) -> dict[str, Array]:
+        """Triads (*batch, 3) corrected, in SI; ``warm`` (*batch, 1) [K] above the temperature of the coefficients."""
+        rig, results = self.rig, dict[str, Array]()
+        if rig.linear:
+            forward, back, acc = self.platform.indicate, self.platform.correct, self.accelerometer
+            works = {
+                "wc": forward if invert else back,
+                "gyro": back if invert else forward,
+                "acc": acc.indicate if invert else acc.correct,
+            }
+            return {sensor: works[sensor](x) for sensor, x in given.items()}
+        none = next(iter(given.values())) * 0.0
+        force = none
+        if "acc" in given:
+            force = rig.force_within(given["acc"]) if invert else rig.force(given["acc"], warm)
+            results["acc"] = rig.outputs(force, warm) if invert else rig.unbent(force, force)
+        for sensor in given.keys() - {"acc"}:
+            if (sensor == "wc") == invert:
+                results[sensor] = rig.unbent(rig.turning(given[sensor], force, warm), force)
+            else:
+                results[sensor] = rig.commanded(rig.bent(given[sensor], force), force, warm)
+        return results
 
 
 def platform_model(estimate: Estimate, where: object = "calibration") -> PlatformModel:
@@ -121,12 +178,25 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
         sound = all(np.isfinite(gain).all() and np.linalg.cond(gain) < _WORST for gain in gains)
     if not sound:
         raise InputError(where, "the coefficients of the platform cannot be inverted, expected small errors")
-    return PlatformModel(platform, accelerometer)
+    rig = RigPlatform(
+        platform,
+        accelerometer,
+        np.array(triple("K2")),
+        np.array(triple("S_asym")),
+        np.array([[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]),
+        np.array(triple("sag")),
+        *(np.array([values.get(f"{of}_{i}_T1", 0.0) for i in "xyz"]) for of in ("kg0", "ka0", "ka1")),
+    )
+    stated = estimate.conditions.get("temperature")
+    value = stated.get("value") if isinstance(stated, Mapping) else None
+    return PlatformModel(
+        platform, accelerometer, rig, float(value) if isinstance(value, int | float) else None
+    )
 
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: the coefficients that `platform_model` leaves out."""
-    left = [name for name in estimate.names if name not in NAMES and not name.startswith(("kg1", "beta"))]
+    left = [name for name in estimate.names if KIND_OF.get(name) in _UNAPPLIED]
     texts = []
     if "beta_x" in estimate.names:
         texts.append("the zero of the encoders beta is not applied: gimbal angles stay as they are")

@@ -354,6 +354,8 @@ def least_squares(equations: Normal, values: Array, prior: Array) -> LeastSquare
     weight = math.sqrt(max(1.0, square / max(count, 1))) / prior
     normal, right = normal + np.diag(weight**2), right + weight**2 * values
     square += float(np.square(weight * values).sum())
+    if not (np.isfinite(normal).all() and np.isfinite(right).all()):  # a case that is lost
+        return LeastSquares(np.zeros(len(right)), np.full(len(right), np.inf), math.inf, 0.0)
     size = np.sqrt(np.diag(normal))
     without = size == 0.0
     size[without] = 1.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.errors import InputError
 from inercal.face.result import Result, View, of_coefficients
-from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
+from inercal.face.study import Progress, Study, calibrations, designed_by, of_files, with_span
 from inercal.records.record import Record
 from inercal.selfcal import task
 
@@ -31,13 +31,16 @@ def calibrate(
     progress: Progress = lambda _: None,
     courses: bool = True,
 ) -> Result:
-    """Calibrate a platform from one run, or from repeat runs together; ``evidence`` has a calibration for each.
+    """Calibrate a platform from one run, from records on bases of their own, or from repeat runs together; ``evidence``
+    has a calibration for each.
 
     Parameters and errors are those of `inercal.calibrate`; ``courses`` as of `inercal.selfcal.task.calibrate`.
     """
     if len(records) > 1 and compare:
         raise InputError("compare", f"found {len(records)} runs, expected one")
 
+    if study.settings.placed:
+        return _together(records, study, progress)
     calibrated = calibrations(
         records,
         study,
@@ -65,6 +68,24 @@ def _one(calibration: task.Calibration, courses: bool) -> Result:
     kept = calibration.filtered.history is not None
     view = of_coefficients(calibration.estimate.shown(), page, more)
     return Result(calibration.estimate, replace(view, rows=rows if kept and courses else None), calibration)
+
+
+def _together(records: Sequence[Record], study: Study, progress: Progress) -> Result:
+    """The result of records that are fitted together."""
+    from inercal.selfcal.several import calibrate_together
+
+    fitted = of_files(records, study, progress, calibrate_together)
+    shown = fitted.estimate.shown()
+
+    def page() -> str:
+        from inercal.report.coefficients import budget, values
+        from inercal.report.html import render
+
+        return render(
+            shown, [values(shown), budget(shown)], "Self-calibration of a platform, several records"
+        )
+
+    return Result(fitted.estimate, of_coefficients(shown, page), fitted.each)
 
 
 def _repeated(calibrated: Sequence[task.Calibration], records: Sequence[Record]) -> Result:

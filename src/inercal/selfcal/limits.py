@@ -41,6 +41,13 @@ class Limits:
     encoder_floor: float = 0.05
     """Part of the encoder noise that is taken for isotropic, against infinite information at gimbal lock."""
 
+    stiff_share: float = 1e-3
+    """Variance of an attitude about a joint that is fixed, over that of the gyros' random walk from row to row: no
+    more, for that joint does not move, so that innovations would be correlated; no less than rounding bears."""
+
+    axes_known: float = math.radians(1.0 / 60.0)
+    """Angle [rad] within which the axis of a joint is known: noise of its angle is noise about others by so much."""
+
     singular_cosine: float = 0.01
     """Cosine of the inner gimbal's angle below which the gimbal angles of a model cannot be used."""
 

@@ -24,7 +24,7 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import TWO_PI
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.platform.states import TEMPERATURE, twins
+from inercal.selfcal.platform.states import TEMPERATURE
 from inercal.selfcal.settings import SelfcalSettings
 
 _REFERENCE = ("q_ref_0", "q_ref_1", "q_ref_2", "q_ref_3")
@@ -34,23 +34,32 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     """The recording in a record, from the first row with all angles and a rate, with findings on what contradicts the
     study.
 
-    The record has ``th_x..z``, ``acc_x..z`` and the rate of the platform, commanded (``wc_x..z``) or, where there is no
-    such, measured (``gyro_x..z``), on one clock; it may have the true attitude, ``q_ref_0..3``. A rate belongs to the
-    interval from its row to the next, one recorded as an increment to the interval before; the last row's rate (or the
-    first increment) is not used.
+    The record has ``th_x..z``, but of joints that the study states as fixed, ``acc_x..z``, and the platform's rate,
+    commanded (``wc_x..z``) or, where there is no such, measured (``gyro_x..z``), on one clock; it may have the true
+    attitude, ``q_ref_0..3``. A rate belongs to the interval from its row to the next, one recorded as an increment to
+    the interval before; the last row's rate (or the first increment) is not used.
 
     Raises RecordError for columns that are missing or on different clocks, time that does not increase, fewer than
     `LIMITS.least_rows` rows, no accelerometers, or units of rates and angles that contradict each other.
     """
     where = record.sources[0].path if record.sources else "record"
-    sensor = _rate_sensor(record, where)
-    columns = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
+    sensor, unread = _rate_sensor(record, settings, where), as_recorded(record, settings).fixed
+    columns = [
+        record[f"{name}_{axis}"]
+        for name in (sensor, "th", "acc")
+        for axis in "xyz"
+        if f"{name}_{axis}" not in unread
+    ]
     reference = [record[name] for name in _REFERENCE] if set(_REFERENCE) <= record.columns.keys() else []
     for column in [*columns[1:], *reference]:
         if column.t is not columns[0].t:
             text = f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time"
             raise RecordError(where, text)
-    rate, th, acc = (np.stack([each.si() for each in columns[k : k + 3]], axis=-1) for k in (0, 3, 6))
+    values = {column.name: column.si() for column in columns}
+    values |= {name: np.full(len(columns[0].t), angle) for name, angle in unread.items()}
+    rate, th, acc = (
+        np.stack([values[f"{name}_{axis}"] for axis in "xyz"], axis=-1) for name in (sensor, "th", "acc")
+    )
     increment = [column.increment for column in columns[:3]]
     # increments were gained since the row before
     rate = np.where(increment, np.vstack([rate[1:], np.full((1, 3), np.nan)]), rate)
@@ -73,7 +82,7 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     true = np.stack([column.values for column in reference], axis=-1)[rows] if reference else None
     recording = Recording(
         t, rate, th, acc, measured, (), record.sources, held, temperature, walk, true,
-        _warm(record, settings, t, where),
+        _warm(record, settings, t, where), tuple(k for k, name in enumerate(JOINTS) if name in unread),
     )  # fmt: skip
     of_record = [  # without extremes beyond which no motion goes on
         each
@@ -106,33 +115,25 @@ def _warm(record: Record, settings: SelfcalSettings, t: Array, where: str) -> Ar
     return settings.warm(np.interp(t, column.t[known], values[known]))
 
 
-def told_apart(settings: SelfcalSettings, th: Array) -> tuple[SelfcalSettings, tuple[Finding, ...]]:
-    """The study without states that nobody can tell from others along angles ``th`` (n, 3) [rad], where a joint stands
-    still; ``at_prior`` names them."""
-    still = np.nanmax(th, axis=0) - np.nanmin(th, axis=0) < LIMITS.still_joint
-    fixed = [int(joint) for joint in np.flatnonzero(still)]
-    left = twins(settings.kinds, fixed)
-    if not left:
-        return settings, ()
-    joints = ", ".join(JOINTS[joint] for joint in fixed)
-    text = (
-        f"{', '.join(left)}: {joints} stands still, they cannot be told from gamma and beta and are left out"
-    )
-    model = replace(settings.model, left_out=left)
-    return replace(settings, model=model), (Finding("at_prior", text),)
+def as_recorded(record: Record, settings: SelfcalSettings) -> SelfcalSettings:
+    """The study with those joints alone fixed that a record has no angle of: one that is there counts."""
+    fixed = {name: angle for name, angle in settings.fixed.items() if name not in record}
+    return replace(settings, fixed=fixed)
 
 
-def _rate_sensor(record: Record, where: str) -> str:
+def _rate_sensor(record: Record, settings: SelfcalSettings, where: str) -> str:
     """``wc`` or ``gyro``, whichever is there whole; refuses a record without all columns."""
     filled = {name for name, column in record.columns.items() if np.isfinite(column.values).any()}
     there = [sensor for sensor in ("wc", "gyro") if filled >= {f"{sensor}_{axis}" for axis in "xyz"}]
-    missing = [f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz" if f"{name}_{axis}" not in record]
+    wanted = [f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz"]
+    missing = [name for name in wanted if name not in record and name not in settings.fixed]
     if not there or missing:
         lacking = f"no {', '.join(missing)}" if missing else "no whole rate wc_x, wc_y, wc_z"
         among = ", ".join(record.columns) or "no columns"
+        of_angle = " (a joint that does not turn is stated by rig.fixed)" if {*missing} & {*JOINTS} else ""
         raise RecordError(
             where,
-            f"found {lacking} among {among}, expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z",
+            f"found {lacking} among {among}, expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z{of_angle}",
         )
     return there[0]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quant
 from inercal.selfcal.estimators import FactorKind, FilterKind
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import Plan
-from inercal.selfcal.platform.rig import Base, Gimbals, World, world
+from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 from inercal.selfcal.platform.states import (
     ALL,
     EXTENDED_MODEL,
@@ -64,10 +65,20 @@ class Noise:
         example="2 arcsec", bounds=within(0.0, math.inf, "an angle of 0 or more"),
     )  # fmt: skip
 
+    vibration: float = quantity(
+        "root mean square along each axis, faster than the rows, noise to the accelerometers", "acceleration", "0 ug",
+        example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
+    )  # fmt: skip
+
     @property
     def of_readings(self) -> Noise:
-        """The same with the sway of the base in the noise of the encoders, which read angles against it."""
-        return replace(self, encoder=math.hypot(self.encoder, self.base_sway / math.sqrt(2.0)))
+        """The same with the sway of the base in the noise of the encoders, which read angles against it, and its
+        vibration in that of the accelerometers."""
+        return replace(
+            self,
+            encoder=math.hypot(self.encoder, self.base_sway / math.sqrt(2.0)),
+            accelerometer=math.hypot(self.accelerometer, self.vibration),
+        )
 
     @property
     def gyro_walk_sigma(self) -> float:
@@ -169,6 +180,10 @@ class Disturbances:
     lost_rows: float = quantity(
         "part of the rows that are not in the file", "number", "0", example="1 %", bounds=PART
     )
+    vibration: float = quantity(
+        "root mean square along each axis, of many frequencies above those of the rows", "acceleration", "0 ug",
+        example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
+    )  # fmt: skip
     base_sway: tuple[float, float] = (0.0, 0.0)
     substeps: int = 10
 
@@ -188,16 +203,38 @@ class Search:
     seed: int = option("of the random starts", 1, least=0)
 
 
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A record with a base of its own: its ``file`` as typed, the ``base``, unknown in heading where
+    ``heading_unknown``, and the ``prior`` (24,) of the coefficients with that of the base."""
+
+    file: str
+    base: Base
+    heading_unknown: bool
+    prior: Array
+
+    def names(self, path: str) -> bool:
+        """True for the path of that file."""
+        own = PurePath(self.file).parts
+        return PurePath(path).parts[-len(own) :] == own
+
+    def of(self, settings: SelfcalSettings) -> SelfcalSettings:
+        """The study with that base."""
+        return replace(settings, base=self.base, heading_unknown=self.heading_unknown, prior=self.prior)
+
+
 @short_repr
 @dataclass(frozen=True, eq=False)
 class SelfcalSettings:
     """A study of self-calibration, in SI.
 
     ``site`` with its uncertainties; ``gimbals`` and ``base`` the rig, its heading to be found from the record where
-    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name; ``plan`` None where a record is
+    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name, and the angle [rad] of each joint
+    that is ``fixed``, on a rig of one or two axes, and has no encoder; ``plan`` None where a record is
     enough. ``prior`` (24,) standard deviations of the coefficients about 0, in the order of
     `inercal.selfcal.platform.coefficients`; ``truth`` (24,), (K,) with the rig's, or None, product form, for
-    simulations; ``goal`` wanted standard uncertainty [SI] by name. ``traceability``, ``temperature``, ``given`` as in
+    simulations; ``goal`` wanted standard uncertainty [SI] by name;
+    ``placed`` the bases of several records. ``traceability``, ``temperature``, ``given`` as in
     `inercal.imu.settings.ImuSettings`.
     """
 
@@ -208,6 +245,7 @@ class SelfcalSettings:
     base: Base = field(default_factory=Base)
     heading_unknown: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
     plan: Plan | None = None
     truth: Array | None = None
     goal: Mapping[str, float] = field(default_factory=dict)
@@ -215,6 +253,7 @@ class SelfcalSettings:
     model: Model = field(default_factory=Model)
     disturbances: Disturbances = field(default_factory=Disturbances)
     search: Search = field(default_factory=Search)
+    placed: tuple[Placed, ...] = ()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)
@@ -223,6 +262,16 @@ class SelfcalSettings:
     def world(self) -> World:
         """Earth rate and gravity on the base."""
         return world(self.site, self.base, self.gimbals)
+
+    @property
+    def unread(self) -> tuple[int, ...]:
+        """Joints 0, 1, 2 that are fixed."""
+        return tuple(k for k, name in enumerate(JOINTS) if name in self.fixed)
+
+    @property
+    def fixed_angles(self) -> Array:
+        """(3,) rad, of fixed joints, 0 for the others."""
+        return np.array([self.fixed.get(name, 0.0) for name in JOINTS])
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -251,7 +300,7 @@ class SelfcalSettings:
         stated = np.zeros(len(ALL))
         for name, (value, _) in self.model.stated.items():
             stated[ALL.index(name)] = value
-        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics)
+        return state_vector(self.kinds, stated, self.model.left_out, self.model.harmonics, self.unread)
 
     @property
     def priors(self) -> Array:

@@ -25,12 +25,13 @@ from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.selfcal.platform.coefficients import BETA
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.reading import recording_of, told_apart
+from inercal.selfcal.reading import as_recorded, recording_of
 from inercal.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.selfcal.result.outcome import assemble, verdict
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.result.tables import of_attitudes, side_by_side
 from inercal.selfcal.settings import SelfcalSettings
+from inercal.selfcal.still_joints import still_joints, told_apart
 
 
 @short_repr
@@ -80,13 +81,9 @@ def calibrate(
     leaves a heading unknown that the record does not tell.
     """
     clock = time.perf_counter()
-    recording = recording_of(record, settings)
     stated_base, rough = settings.base, is_rough(settings)
-    if rough:
-        progress("looking for the heading" if settings.heading_unknown else "looking for the base")
-        settings = with_base(recording, settings)
-        recording = recording_of(record, settings)  # rates over gaps depend on it
-    settings, left_out = told_apart(settings, recording.th)
+    recording, settings = based(record, settings, progress)
+    settings, left_out = told_apart(settings, still_joints(settings, recording.th), recording.th[0])
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
     filtered = filtering.estimate(recording, of, courses=courses)
@@ -126,6 +123,22 @@ def calibrate(
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
     return Calibration(timed, of, recording, filtered, bounds, settings, compared, stated, truth)
+
+
+def based(
+    record: Record, settings: SelfcalSettings, progress: Callable[[str], None] = lambda _: None
+) -> tuple[Recording, SelfcalSettings]:
+    """The recording in a record, and the study with its base: found from the recording where it is stated too roughly.
+
+    Raises as `calibrate`.
+    """
+    settings = as_recorded(record, settings)
+    recording = recording_of(record, settings)
+    if not is_rough(settings):
+        return recording, settings
+    progress("looking for the heading" if settings.heading_unknown else "looking for the base")
+    settings = with_base(recording, settings)
+    return recording_of(record, settings), settings  # rates over gaps depend on it
 
 
 def _base(settings: SelfcalSettings, estimate: Estimate) -> tuple[dict[str, Any], str]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -89,6 +89,8 @@ class Selfcal:
         Its filter must be a recursive one.
     every : float
         Interval [s] of the lines, in the time of the record; 0 for a line each row.
+    fixed : mapping
+        Angle [rad] of the joints that are fixed and have no column, by name.
     say : callable
         Told of gaps, of the first few; and once each when the innovations contradict the model, when the filter
         diverges, and when the gimbals lock.
@@ -109,11 +111,13 @@ class Selfcal:
         problem: FilterProblem,
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
+        fixed: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._module, self._problem, self._every, self._say = filter_of(problem), problem, every, say
         self._where, record = lines.where, lines.record
         sensor = "gyro" if "gyro_x" in record and "wc_x" not in record else "wc"
-        channels = [record[f"{name}_{axis}"] for name in (sensor, "th", "acc") for axis in "xyz"]
+        wanted = [f"{name}_{axis}" for name in (sensor, "th", "acc") for axis in "xyz"]
+        channels = [record[name] for name in wanted if name not in fixed]
         for column in channels:
             column.si()  # refuses counts
         rates = {column.name for column in channels[:3] if not column.increment}
@@ -122,6 +126,7 @@ class Selfcal:
         names = list(record.columns)
         self._places = [names.index(column.name) for column in channels]
         self._factors = [column.unit.factor for column in channels]
+        self._fixed = [(k, fixed[name]) for k, name in enumerate(wanted) if name in fixed]
         self._measured = sensor == "gyro"
         self._gained = np.array([column.increment for column in channels[:3]])
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
@@ -137,7 +142,7 @@ class Selfcal:
             "filter": repr(problem.filter),
             "rate": ", ".join(map(str, [*self._places, *self._gained.tolist()])),
             "every": self._every,
-        }
+        } | ({"fixed": str(self._fixed)} if self._fixed else {})
 
     def initial(self) -> SelfcalState:
         """Nothing known."""
@@ -154,7 +159,10 @@ class Selfcal:
         if math.isnan(sample.t):
             return state, ()
         values = zip(self._places, self._factors, strict=True)
-        rate, th, acc = np.array([sample.values[i] * factor for i, factor in values]).reshape(3, 3)
+        numbers = [sample.values[i] * factor for i, factor in values]
+        for k, angle in self._fixed:
+            numbers.insert(k, angle)
+        rate, th, acc = np.array(numbers).reshape(3, 3)
         over = np.where(self._gained, rate, state.next)
         following = np.where(self._gained, np.nan, rate)
         if not state.begun or (math.isnan(state.steps[-1]) and not np.isfinite(over).all()):

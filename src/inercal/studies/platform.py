@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, get_args
 
@@ -14,8 +15,17 @@ from inercal.errors import StudyError
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import JointName, Move, Plan, Rest, Turn, path
 from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
-from inercal.studies.fields import AsTyped, Duration, QuantityText, Several, SeveralTexts, positive, refusal
-from inercal.studies.rig import Angle, Limits
+from inercal.studies.fields import (
+    AsTyped,
+    Duration,
+    ExactText,
+    QuantityText,
+    Several,
+    SeveralTexts,
+    positive,
+    refusal,
+)
+from inercal.studies.rig import Angle
 from inercal.units import Quantity, shown
 
 _ENDS = SeveralTexts(QuantityText("angle", "-90 deg"), "the lowest, the highest angle")
@@ -40,6 +50,7 @@ def _signs(signs: object) -> object:
     return signs
 
 
+FixedAngle = Annotated[Quantity, ExactText("angle", "0 deg")]
 AxisName = Literal["x", "y", "z"]
 Order = Annotated[list[AxisName], BeforeValidator(_once_each), Field(min_length=3, max_length=3)]
 Signs = Annotated[
@@ -61,6 +72,14 @@ class GimbalLimitsTable(Strict):
     z: Annotated[Several, _ENDS] | None = Field(
         default=None, description="of the joint of the platform", examples=[["-360 deg", "360 deg"]]
     )
+
+
+class FixedJointsTable(Strict):
+    """Joints that do not turn, of a rig of one or two axes; a record needs no column of their angles."""
+
+    x: FixedAngle | None = Field(default=None, description="outer angle", examples=["0 deg"])
+    y: FixedAngle | None = Field(default=None, description="of the inner joint", examples=["0 deg"])
+    z: FixedAngle | None = Field(default=None, description="of the joint of the platform", examples=["0 deg"])
 
 
 class GimbalsTable(Strict):
@@ -89,6 +108,25 @@ class GimbalsTable(Strict):
     limits: GimbalLimitsTable = Field(
         default=GimbalLimitsTable(), title="Limits", description="ranges of the joints; none if absent"
     )
+    fixed: FixedJointsTable = Field(
+        default=FixedJointsTable(),
+        title="Fixed joints",
+        description="joints that do not turn, and their angles; all turn if absent",
+    )
+
+
+class PlacedRecordTable(Strict):
+    """A record of a platform on a base of its own; several are fitted together."""
+
+    file: Annotated[str, Field(min_length=1)] = Field(
+        description="of the record, as the command is given it", examples=["south.csv"]
+    )
+    heading: Angle | Literal["unknown"] | None = Field(
+        default=None, description="of the base, from north to east; that of [rig] if absent"
+    )
+    tilt: Annotated[Several, _TILT] | None = Field(
+        default=None, description="of the base, about north and about east; that of [rig] if absent"
+    )
 
 
 def gimbals_of(table: GimbalsTable) -> Gimbals:
@@ -98,11 +136,13 @@ def gimbals_of(table: GimbalsTable) -> Gimbals:
     return Gimbals((x, y, z), (outer, inner, platform))
 
 
-def base_of(table: GimbalsTable) -> Base:
-    """Attitude of the base."""
-    heading = None if table.heading == "unknown" else table.heading
-    north, east = (0.0, 0.0) if table.tilt is None else table.tilt.values
-    tilt_u = (0.0, 0.0) if table.tilt is None else tuple(each.u for each in table.tilt.quantities)
+def base_of(table: GimbalsTable, record: PlacedRecordTable | None = None) -> Base:
+    """Attitude of the base, that of a ``record`` where it states another."""
+    typed = table.heading if record is None or record.heading is None else record.heading
+    tilt = table.tilt if record is None or record.tilt is None else record.tilt
+    heading = None if typed == "unknown" else typed
+    north, east = (0.0, 0.0) if tilt is None else tilt.values
+    tilt_u = (0.0, 0.0) if tilt is None else tuple(each.u for each in tilt.quantities)
     return Base(
         table.frame,
         0.0 if heading is None else heading.value,
@@ -129,6 +169,15 @@ def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, floa
             )
         limits[name] = (low, high)
     return limits
+
+
+def fixed_of(table: GimbalsTable, where: object) -> dict[str, float]:
+    """Angle [rad] of the joints that do not turn, by name; raises `StudyError` where none turns."""
+    typed = {name: getattr(table.fixed, name[-1]) for name in JOINTS}
+    fixed = {name: angle.value for name, angle in typed.items() if angle is not None}
+    if len(fixed) == len(JOINTS):
+        raise StudyError(where, "rig.fixed: found all joints, expected one that turns")
+    return fixed
 
 
 FEWEST = 10
@@ -202,10 +251,10 @@ class PlanTable(Strict):
     )
 
 
-def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
-    """The plan; its angles within the ``limits`` [rad].
+def plan_of(table: PlanTable, fixed: Mapping[str, float], where: object) -> Plan:
+    """The plan; those of ``fixed`` joints [rad] as they are.
 
-    Raises `StudyError` for neither or both of turns and path, too few or too many rows, or angles beyond the limits.
+    Raises `StudyError` for neither or both of turns and path, too few or too many rows, or a turn of a fixed joint.
     """
     match table:
         case PlanTable(turns=None, path=str(name)):
@@ -222,17 +271,27 @@ def plan_of(table: PlanTable, limits: Limits, where: object) -> Plan:
     if table.start is not None:
         x, y, z = table.start.values
         plan = replace(plan, start=(x, y, z))
+    plan = _with_fixed(plan, fixed, table.start is not None, where)
     rows = plan.duration / plan.step
     if not FEWEST <= rows <= LIMITS.most_rows:
         raise StudyError(
             where,
             f"plan: found {rows:.6g} steps of {plan.step:g} s, expected {FEWEST} to {LIMITS.most_rows:,}",
         )
-    if beyond := plan.beyond(limits):
-        low, high = limits[beyond[0]]
-        raise StudyError(
-            where,
-            f"plan: found turns that take {beyond[0]} beyond rig.limits, expected them within "
-            f"{math.degrees(low):.6g} deg to {math.degrees(high):.6g} deg",
-        )
     return plan
+
+
+def _with_fixed(plan: Plan, fixed: Mapping[str, float], stated: bool, where: object) -> Plan:
+    """The plan with joints that do not turn at their angles; raises `StudyError` where it turns one of them, or begins
+    elsewhere."""
+    for k, name in enumerate(JOINTS):
+        if name not in fixed:
+            continue
+        if any(isinstance(move, Turn) and move.joint == name[-1] for move in plan.moves):
+            raise StudyError(where, f"plan: found a turn of {name}, expected none of a joint of rig.fixed")
+        if stated and abs(plan.start[k] - fixed[name]) > 1e-9:
+            found, wanted = math.degrees(plan.start[k]), math.degrees(fixed[name])
+            text = f"plan.start: found {found:.6g} deg for {name}, expected {wanted:.6g} deg as of rig.fixed"
+            raise StudyError(where, text)
+    x, y, z = (fixed.get(name, plan.start[k]) for k, name in enumerate(JOINTS))
+    return replace(plan, start=(x, y, z))

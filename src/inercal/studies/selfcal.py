@@ -23,6 +23,7 @@ from inercal.selfcal.settings import (
     Filter,
     Gating,
     Noise,
+    Placed,
     Search,
     SelfcalSettings,
 )
@@ -45,7 +46,16 @@ from inercal.studies.laboratory import (
     Tolerances,
     traced,
 )
-from inercal.studies.platform import GimbalsTable, PlanTable, base_of, gimbals_of, limits_of, plan_of
+from inercal.studies.platform import (
+    GimbalsTable,
+    PlacedRecordTable,
+    PlanTable,
+    base_of,
+    fixed_of,
+    gimbals_of,
+    limits_of,
+    plan_of,
+)
 from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
@@ -166,6 +176,12 @@ class SelfcalStudyFile(Strict):
     version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
     rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
+    records: list[PlacedRecordTable] = Field(
+        default=[],
+        title="Records",
+        description="records on bases of their own, fitted together; one base for all if absent",
+        examples=[[{"file": "south.csv", "heading": "180 deg"}]],
+    )
     plan: PlanTable | None = Field(
         default=None, title="Plan", description="the path; a recording can do without"
     )
@@ -199,7 +215,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     ``path`` is where it came from; files that the study names lie beside it.
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
-    base, limits = base_of(file.rig), limits_of(file.rig, path)
+    base, limits, fixed = base_of(file.rig), limits_of(file.rig, path), fixed_of(file.rig, path)
     return SelfcalSettings(
         site=_site(file.site, path),
         noise=file.noise,
@@ -208,17 +224,26 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         base=base,
         heading_unknown=file.rig.heading == "unknown",
         limits=limits,
-        plan=None if file.plan is None else plan_of(file.plan, limits, path),
+        fixed=fixed,
+        plan=None if file.plan is None else plan_of(file.plan, fixed, path),
         truth=None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances)),
         goal=_wanted(file.goal),
         filter=_filter(file.filter),
         model=model_of(file.model, file.filter, path),
         disturbances=_disturbances(file.disturbances),
         search=file.design,
+        placed=tuple(_placed(each, file) for each in file.records),
         traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
         given=as_typed(data),
     )
+
+
+def _placed(table: PlacedRecordTable, file: SelfcalStudyFile) -> Placed:
+    """A record with its base."""
+    base = base_of(file.rig, table)
+    typed = file.rig.heading if table.heading is None else table.heading
+    return Placed(table.file, base, typed == "unknown", _prior(file.prior, base))
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:

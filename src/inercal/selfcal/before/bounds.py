@@ -25,6 +25,7 @@ from inercal.selfcal.filters.problem import (
     FilterModel,
     FilterProblem,
     admitted,
+    apart,
     encoders_at,
     updating,
     watch,
@@ -296,7 +297,14 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                 watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
-                    roots, _ = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                    roots, _ = encoder_roots(
+                        th[k],
+                        world.axes,
+                        world.signs,
+                        noise.encoder,
+                        noise.joints,
+                        apart(noise, step.dt, noise.encoder),
+                    )
                     wide = encoder_columns(
                         th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                     )

@@ -23,7 +23,15 @@ from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import exp, right_jacobian, rotate
 from inercal.selfcal.before.bounds import Path, arrived
 from inercal.selfcal.filters.gaps import anew
-from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
+from inercal.selfcal.filters.problem import (
+    FilterModel,
+    FilterProblem,
+    admitted,
+    apart,
+    encoders_at,
+    updating,
+    watch,
+)
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
     WALK_TIME,
@@ -47,7 +55,7 @@ from inercal.selfcal.platform.model import (
     specific_force,
 )
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, WALK, Layout
+from inercal.selfcal.platform.states import ALL, WALK
 
 
 def sensitivities(
@@ -107,7 +115,9 @@ def _carried(
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     warm = np.zeros(len(q)) if recording.warm is None else recording.warm
     first = 0
-    model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
+    model = problem.model._replace(
+        layout=whole.layout._replace(chosen=states.index, place=place, stated=full)
+    )
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
@@ -162,7 +172,14 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
             if measured[k, 3]:
-                roots, variances = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
+                roots, variances = encoder_roots(
+                    th[k],
+                    world.axes,
+                    world.signs,
+                    noise.encoder,
+                    noise.joints,
+                    apart(noise, step.dt, noise.encoder),
+                )
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                 )

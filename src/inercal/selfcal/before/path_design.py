@@ -19,6 +19,7 @@ from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
 from inercal.selfcal.settings import SelfcalSettings
+from inercal.selfcal.still_joints import without_fixed
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -91,6 +92,7 @@ def design(
     Bounds are those of the nominal path: the prior of the coefficients is enough. ``progress`` is told (done, total).
     Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
+    settings = without_fixed(settings)[0]
     best = search(settings, progress)
     asked = settings.search
     plans = {"found": best}
@@ -99,6 +101,8 @@ def design(
     for name in PATHS:
         other = replace(path(name, best.step), rate=best.rate, start=best.start)
         left = best.duration - other.duration
+        if any(isinstance(move, Turn) and f"th_{move.joint}" in settings.fixed for move in other.moves):
+            continue
         if left > -best.step / 2.0 and (settings.plan is None or other.moves != settings.plan.moves):
             plans[name] = lasting(other, best.duration)
     judged = tuple(_compared(name, plan, settings) for name, plan in plans.items())

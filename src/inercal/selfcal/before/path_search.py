@@ -104,7 +104,8 @@ class _Ground:
 
 def _ground(settings: SelfcalSettings) -> _Ground:
     """The ground of a study's search."""
-    asked, model = settings.search, replace(settings.plan or Plan(()), moves=())
+    x, y, z = settings.fixed_angles.tolist()
+    asked, model = settings.search, replace(settings.plan or Plan((), start=(x, y, z)), moves=())
     if asked.time is None and settings.plan is None:
         raise StudyError("design.time", "missing, expected a time or a plan that is as long")
     time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
@@ -148,6 +149,7 @@ def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
     reach = math.acos(LIMITS.path_cosine)
     limits = {"th_y": (level - reach, level + reach)} | dict(settings.limits)
     free = (-math.inf, math.inf)
+    limits |= {joint: (angle, angle) for joint, angle in settings.fixed.items()}
     ends = np.array([limits.get(joint, free) for joint in JOINTS]) - np.array(model.start)[:, None]
     slack = 1e-9
     return ends[:, 0] / settings.search.angle - slack, ends[:, 1] / settings.search.angle + slack

@@ -12,6 +12,7 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.geometry.rotations import exp, multiply
 from inercal.records.record import Record, record_of
+from inercal.selfcal.before.driven import Driven, drive
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.kinematics import all_angles, attitude
@@ -19,6 +20,7 @@ from inercal.selfcal.platform.model import Truth, simulate_truth
 from inercal.selfcal.platform.plan import CommandedMotion, motion
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
+from inercal.selfcal.platform.states import ALL
 from inercal.selfcal.settings import Disturbances, Noise, SelfcalSettings
 from inercal.units import parse_unit
 
@@ -27,7 +29,8 @@ from inercal.units import parse_unit
 class Experiment:
     """A plan on a rig, ready to be simulated many times: ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the
     rates on which the platform acts in each finer step; ``truth`` (24 or K,) full vector in the linear form; ``warm``
-    (n,) [K] above the temperature of the coefficients, None where that is constant."""
+    (n,) [K] above the temperature of the coefficients, None where that is constant. Where joints are ``fixed``, motors
+    drive the others, and the gyros measure."""
 
     world: World
     noise: Noise
@@ -36,6 +39,7 @@ class Experiment:
     truth: Array
     disturbances: Disturbances
     warm: Array | None = None
+    fixed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +52,31 @@ class Simulated:
 
 
 def experiment(settings: SelfcalSettings) -> Experiment:
-    """Prepare the simulation that a study states; raises StudyError where it has no plan or no truth."""
+    """Prepare the simulation that a study states; raises StudyError where it has no truth, no plan, or one beyond the
+    limits of the joints."""
     if settings.plan is None:
         raise StudyError("plan", "missing, expected the turns to be simulated")
     if settings.truth is None:
         raise StudyError("truth", "missing, expected the true coefficients")
+    if beyond := settings.plan.beyond(settings.limits):
+        low, high = (math.degrees(end) for end in settings.limits[beyond[0]])
+        text = f"found turns that take {beyond[0]} beyond rig.limits"
+        raise StudyError("plan", f"{text}, expected them within {low:.6g} deg to {high:.6g} deg")
     commanded = motion(settings.plan, settings.world)
     other, truth = settings.disturbances, settings.truth
-    if not truth[24:].any():
+    if settings.unread:
+        truth = np.append(truth, np.zeros(len(ALL) - len(truth)))
+        if other.command_delay > 0.0 or other.servo_jitter > 0.0:
+            name = "command_delay" if other.command_delay > 0.0 else "servo_jitter"
+            text = "found it of a rig with fixed joints, whose platform nobody commands, expected none"
+            raise StudyError(f"disturbances.{name}", text)
+    elif not truth[24:].any():
         truth = truth[:24]
     fine = _acting(commanded, other.substeps, other.command_delay)
     temperature = settings.simulated_temperature(len(commanded.t))
     warm = None if temperature is None else settings.warm(temperature)
-    return Experiment(settings.world, settings.noise, commanded, fine, to_linear(truth), other, warm)
+    world, fixed = settings.world, settings.unread
+    return Experiment(world, settings.noise, commanded, fine, to_linear(truth), other, warm, fixed)
 
 
 def _acting(commanded: CommandedMotion, m: int, delay: float) -> Array:
@@ -80,39 +96,23 @@ def _acting(commanded: CommandedMotion, m: int, delay: float) -> Array:
 
 def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     """Turn the platform once through its plan."""
-    world, noise, other = experiment.world, experiment.noise, experiment.disturbances
-    commanded, n = experiment.motion, len(experiment.motion.t)
-    t, rate, fine = commanded.t, commanded.rate, experiment.fine
-    if other.servo_jitter > 0.0:
-        own = other.servo_jitter * rng.standard_normal(rate.shape)
-        rate, fine = rate + own, fine + own[:, None]
-    dt = float(commanded.t[1] - commanded.t[0]) / fine.shape[1]
-    wander = rng.standard_normal(fine.shape)
-    wander *= noise.angle_random_walk / np.sqrt(dt)
-    step = dt * fine.shape[1]
-    if other.gyro_walk > 0.0:
-        wander += wandering(other.gyro_walk, step, n, rng)[:-1, None]
-    if other.gyro_flicker > 0.0:
-        wander += flicker(other.gyro_flicker, n, rng)[:-1, None]
-    q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
-    q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
-    read = commanded.angles.copy()
-    warm = np.zeros(n) if experiment.warm is None else experiment.warm
-    simulate_truth(q0, fine, dt, wander, warm, experiment.truth, world, Truth(q, acc, read))
-    all_angles(q, commanded.angles[0], world.axes, world.signs, th)
+    noise, other, t = experiment.noise, experiment.disturbances, experiment.motion.t
+    n, step = len(t), float(t[1] - t[0])
+    rate, q, acc, read, th = (_driven if experiment.fixed else _commanded)(experiment, rng)
     acc += noise.accelerometer * rng.standard_normal((n, 3))
+    if other.vibration > 0.0:  # sampled more slowly than it is
+        acc += other.vibration * rng.standard_normal((n, 3))
     if other.accelerometer_walk > 0.0:
         acc += wandering(other.accelerometer_walk, step, n, rng)
     if other.flicker > 0.0:
         acc += flicker(other.flicker, n, rng)
-    measured = (read if len(experiment.truth) > 24 else th) + noise.encoder * rng.standard_normal((n, 3))
+    measured = read + noise.encoder * rng.standard_normal((n, 3))
     for joint, order, amplitude, phase in other.harmonics:
         measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
-    if other.base_sway[0] > 0.0:
-        swing = 2.0 * math.pi * (other.base_sway[1] * t + rng.random())
-        about = other.base_sway[0] * np.stack([np.cos(swing), np.sin(swing)], axis=-1) @ _level(world)
+    if other.base_sway[0] > 0.0 and not experiment.fixed:
         swayed = np.empty((n, 3))
-        all_angles(multiply(exp(-about), q), commanded.angles[0], world.axes, world.signs, swayed)
+        world, about = experiment.world, _swaying(experiment, rng)
+        all_angles(multiply(exp(-about), q), experiment.motion.angles[0], world.axes, world.signs, swayed)
         measured += swayed - th
     if other.quantisation > 0.0:
         measured = other.quantisation * np.round(measured / other.quantisation)
@@ -127,11 +127,68 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
                 f"found {other.stamp_jitter:.3g} s for rows every {step:.3g} s, expected time that increases"
             )
             raise StudyError("disturbances.stamp_jitter", text)
-    recording = Recording(t, rate, measured, acc, warm=experiment.warm)
+    measured[:, experiment.fixed] = experiment.motion.angles[:, experiment.fixed]
+    recording = Recording(
+        t, rate, measured, acc, bool(experiment.fixed), warm=experiment.warm, fixed=experiment.fixed
+    )
     made = Simulated(recording, q, th)
     if other.lost_rows == 0.0:
         return made
     return _rows(made, np.flatnonzero(np.append(True, rng.random(n - 1) >= other.lost_rows)))
+
+
+def _commanded(experiment: Experiment, rng: np.random.Generator) -> tuple[Array, ...]:
+    """Rates (n - 1, 3), attitudes (n, 4), accelerometers, encoders and true angles (n, 3) of a platform that turns as
+    its gyros say, which are commanded."""
+    world, other, commanded = experiment.world, experiment.disturbances, experiment.motion
+    n, rate, fine = len(commanded.t), commanded.rate, experiment.fine
+    if other.servo_jitter > 0.0:
+        own = other.servo_jitter * rng.standard_normal(rate.shape)
+        rate, fine = rate + own, fine + own[:, None]
+    dt = float(commanded.t[1] - commanded.t[0]) / fine.shape[1]
+    wander = rng.standard_normal(fine.shape)
+    wander *= experiment.noise.angle_random_walk / np.sqrt(dt)
+    wander += _of_biases(experiment, rng)[:, None]
+    q, acc, th = np.empty((n, 4)), np.empty((n, 3)), np.empty((n, 3))
+    q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
+    read = commanded.angles.copy()
+    warm = np.zeros(n) if experiment.warm is None else experiment.warm
+    simulate_truth(q0, fine, dt, wander, warm, experiment.truth, world, Truth(q, acc, read))
+    all_angles(q, commanded.angles[0], world.axes, world.signs, th)
+    return rate, q, acc, read if len(experiment.truth) > 24 else th.copy(), th
+
+
+def _driven(experiment: Experiment, rng: np.random.Generator) -> tuple[Array, ...]:
+    """The same of a platform whose joints are driven by motors, and whose gyros measure."""
+    angles, t = experiment.motion.angles, experiment.motion.t
+    n, dt = len(t), float(t[1] - t[0])
+    wander = experiment.noise.angle_random_walk / math.sqrt(dt) * rng.standard_normal((n - 1, 3))
+    wander += _of_biases(experiment, rng)
+    sway = _swaying(experiment, rng) if experiment.disturbances.base_sway[0] > 0.0 else np.zeros((n, 3))
+    warm = np.zeros(n) if experiment.warm is None else experiment.warm
+    out = Driven(np.empty((n, 4)), np.empty((n - 1, 3)), np.empty((n, 3)), np.empty((n, 3)))
+    drive(angles, sway, dt, wander, warm, experiment.truth, experiment.world, out)
+    return out.rate, out.q, out.acc, out.th, angles
+
+
+def _of_biases(experiment: Experiment, rng: np.random.Generator) -> Array:
+    """Noise (n - 1, 3) [rad/s] of the gyros that is not white."""
+    other, t = experiment.disturbances, experiment.motion.t
+    wander = np.zeros((len(t), 3))
+    if other.gyro_walk > 0.0:
+        wander += wandering(other.gyro_walk, float(t[1] - t[0]), len(t), rng)
+    if other.gyro_flicker > 0.0:
+        wander += flicker(other.gyro_flicker, len(t), rng)
+    return wander[:-1]
+
+
+def _swaying(experiment: Experiment, rng: np.random.Generator) -> Array:
+    """Turns (n, 3) [rad] of the base about level axes, in b."""
+    amplitude, frequency = experiment.disturbances.base_sway
+    swing = 2.0 * math.pi * (frequency * experiment.motion.t + rng.random())
+    return np.asarray(
+        amplitude * np.stack([np.cos(swing), np.sin(swing)], axis=-1) @ _level(experiment.world)
+    )
 
 
 def _rows(made: Simulated, rows: NDArray[np.int64]) -> Simulated:
@@ -179,24 +236,27 @@ def wandering(walk: float, step: float, n: int, rng: np.random.Generator) -> Arr
 
 
 #: sensor -> unit of its columns in a simulated file
-_UNITS = {"wc": "deg/h", "th": "deg", "acc": "m/s^2"}
+_UNITS = {"wc": "deg/h", "gyro": "deg/h", "th": "deg", "acc": "m/s^2"}
 
 
 def to_record(
     recording: Recording, attitude: Array | None = None, temperature: Array | None = None
 ) -> Record:
-    """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), ``th_x..``, ``acc_x..``, and ``q_ref_0..``
-    and ``temperature`` where the true ``attitude`` (n, 4) q_bp and the temperature (n,) [degC] are given."""
+    """A record as a file holds it: ``t``, ``wc_x..`` (the last row's empty), or ``gyro_x..`` where rates are measured,
+    ``th_x..`` but of fixed joints, ``acc_x..``, and ``q_ref_0..`` and ``temperature`` where the true ``attitude``
+    (n, 4) q_bp and the temperature (n,) [degC] are given."""
     values = {
-        "wc": np.vstack([recording.rate, np.full(3, np.nan)]),
+        "gyro" if recording.measured else "wc": np.vstack([recording.rate, np.full(3, np.nan)]),
         "th": recording.th,
         "acc": recording.acc,
     }
     columns = []
-    for sensor, symbol in _UNITS.items():
-        unit = parse_unit(symbol)
+    for sensor, channels in values.items():
+        unit = parse_unit(_UNITS[sensor])
         columns += [
-            (f"{sensor}_{axis}", unit, values[sensor][:, k] / unit.factor) for k, axis in enumerate("xyz")
+            (f"{sensor}_{axis}", unit, channels[:, k] / unit.factor)
+            for k, axis in enumerate("xyz")
+            if sensor != "th" or k not in recording.fixed
         ]
     if attitude is not None:
         columns += [(f"q_ref_{k}", parse_unit("1"), attitude[:, k]) for k in range(4)]

@@ -21,6 +21,7 @@ from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.kinematics import axes_of
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import ALL, STATES, TEMPERATURE, UNIT_OF, twins
 
@@ -70,7 +71,9 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     about = case, now
     recording, problem = case
     still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
-    left_out = {*twins(tuple(_WORDS), np.flatnonzero(still).tolist()), *_unturned(recording, problem)}
+    about_axes = axes_of(recording.th[0], problem.world.axes, problem.world.signs).tolist()
+    hidden = twins(tuple(_WORDS), np.flatnonzero(still).tolist(), about_axes)
+    left_out = {*hidden, *_unturned(recording, problem)}
     kinds = dict[str, tuple[str, ...]]()
     for kind in _WORDS:
         names = tuple(name for name in STATES[kind].parameters if name not in left_out)

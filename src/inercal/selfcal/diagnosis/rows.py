@@ -199,6 +199,8 @@ def _stuck(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
     """An encoder that stands still while its joint is commanded to turn."""
     n = len(recording.th)
     for joint, name in enumerate(JOINTS):
+        if joint in recording.fixed:
+            continue
         sent, moved = np.abs(turn.sent[:, joint]), np.abs(turn.moved[:, joint])
         still = (sent > LIMITS.noise_sigmas * turn.noise) & (moved < LIMITS.still_share * sent)
         for start, end in _runs(still):

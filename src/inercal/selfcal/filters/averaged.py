@@ -68,7 +68,8 @@ def averaged(
     _average(q, rows, middle, m, full, problem.states.layout, problem.world, out)
     th = recording.th[middle]
     _, joints = gimbals(np.where(read[middle, None], th, 0.0), problem.world)
-    th = th + np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), out.turned)
+    by = np.einsum("kij,kj->ki", np.linalg.pinv(joints, rcond=1e-3), out.turned)
+    th = th + np.where(problem.states.layout.turning, by, 0.0)  # a fixed joint is where it is
     anew = np.unique(np.array(found.restarts, dtype=np.int64) // m)
     anew = anew[(anew > 0) & (anew < count)]
     th[anew], out.acc[anew] = np.nan, np.nan
@@ -81,7 +82,12 @@ def averaged(
         held=tuple((anew - 1).tolist()), reference=None, warm=None if recording.warm is None else warm[middle],
     )  # fmt: skip
     noise, root = problem.noise, math.sqrt(m)
-    noise = replace(noise, encoder=noise.encoder / root, accelerometer=noise.accelerometer / root)
+    noise = replace(
+        noise,
+        encoder=noise.encoder / root,
+        accelerometer=noise.accelerometer / root,
+        base_sway=noise.base_sway / root,
+    )
     return fewer, replace(problem, noise=noise)
 
 
@@ -159,7 +165,7 @@ def _average(
             )
             th = rows.th[k]
             if not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2])):
-                to = encoders_attitude(th, of, earth_e, up_e, c, layout.waves, world.axes, world.signs)
+                to = encoders_attitude(th, of, earth_e, up_e, c, layout, world.axes, world.signs)
                 miss = log(multiply((at[0], -at[1], -at[2], -at[3]), to))
                 read += 1
                 for i in range(3):

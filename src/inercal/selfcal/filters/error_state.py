@@ -21,6 +21,7 @@ from inercal.selfcal.filters.problem import (
     FilterProblem,
     Start,
     admitted,
+    apart,
     encoders_at,
     updating,
     watch,
@@ -150,6 +151,8 @@ def encoder_update(
     axes: Axes,
     signs: Array,
     sigma: float,
+    joints: Array,
+    floor: float,
     P: Array,
     x: Array,
     columns: Columns,
@@ -160,10 +163,10 @@ def encoder_update(
 ) -> float:
     """Put encoders of noise ``sigma`` [rad] into covariance ``P`` and error state ``x``; returns the sum of squares.
 
-    ``of_encoders`` (4,) the attitude that they have, with ``count`` columns of states; ``innovations`` (3,) are
-    written, or (0,).
+    ``joints`` and ``floor`` as of `encoder_roots`; ``of_encoders`` (4,) the attitude that they have, with ``count``
+    columns of states; ``innovations`` (3,) are written, or (0,).
     """
-    roots, variances = encoder_roots(angles, axes, signs, sigma)
+    roots, variances = encoder_roots(angles, axes, signs, sigma, joints, floor)
     miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
     if len(innovations) > 0:
         for i in range(3):
@@ -216,7 +219,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         if history:
@@ -238,6 +241,8 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 axes,
                 signs,
                 sigma,
+                noise.joints,
+                apart(noise, dt, sigma),
                 P,
                 x,
                 columns,

@@ -26,7 +26,7 @@ from inercal.selfcal.estimators import FACTOR_OF
 from inercal.selfcal.filters.error_state import corrected, encoder_update, shaken, undecided
 from inercal.selfcal.filters.error_state import initial as initial
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
-from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, updating, watch
+from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, apart, updating, watch
 from inercal.selfcal.platform.kinematics import nearest_turn
 from inercal.selfcal.platform.linearised import WIDEST, Places, empty_columns, encoder_columns, wander
 from inercal.selfcal.platform.model import (
@@ -194,7 +194,7 @@ def _advance(
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
-            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, axes, signs)
+            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout, axes, signs)
             watch(specific_force(of_encoders, up_e), gate, near)
         take = updating(gate, near)
         total, count = 0.0, 0
@@ -216,6 +216,8 @@ def _advance(
                 axes,
                 signs,
                 sigma,
+                noise.joints,
+                apart(noise, dt, sigma),
                 P,
                 x,
                 of_states,

@@ -18,7 +18,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Vector
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.selfcal.platform.linearised import empty_columns, encoder_columns
+from inercal.selfcal.platform.linearised import AXES, FLOOR, STIFF, empty_columns, encoder_columns
 from inercal.selfcal.platform.model import Rates, encoders_attitude, on_the_base
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import ALL, Layout, StateVector
@@ -83,13 +83,26 @@ def updating(gate: Gate, near: NDArray[np.int64]) -> bool:
 class NoiseLevels(NamedTuple):
     """Standard deviations as kernels take them: ``angle_random_walk`` of the gyros [rad/sqrt(s)], ``accelerometer``
     [m/s^2] and ``encoder`` [rad] of each sample; of biases that walk, about their means, ``gyro_walk`` [rad/s] and
-    ``accelerometer_walk`` [m/s^2]."""
+    ``accelerometer_walk`` [m/s^2]; ``joints`` (3,) variance of each joint's angle over that of an encoder: 1, and of a
+    joint that is fixed, without an encoder, what the sway of the base makes of it."""
 
     angle_random_walk: float
     accelerometer: float
     encoder: float
     gyro_walk: float
     accelerometer_walk: float
+    joints: Array
+
+
+@kernel
+def apart(noise: NoiseLevels, dt: float, sigma: float) -> float:
+    """Variance [rad^2] of an attitude by the encoders about each axis, beside that of the joints' angles, of standard
+    deviation ``sigma`` [rad]: of three joints `LIMITS.encoder_floor` of the encoders' noise. Where joints are fixed, it
+    is a part of what the gyros wander within the ``dt`` [s] to the row before, so that the innovations about a fixed
+    joint are the noise of the gyros, and what an axis that is not quite known makes of sigma."""
+    if noise.joints[0] * noise.joints[1] * noise.joints[2] == 1.0:
+        return FLOOR * FLOOR * sigma * sigma
+    return STIFF * noise.angle_random_walk * noise.angle_random_walk * dt + AXES * AXES * sigma * sigma
 
 
 class FilterModel(NamedTuple):
@@ -148,6 +161,7 @@ class FilterProblem:
         levels = NoiseLevels(
             float(noise.angle_random_walk), float(noise.accelerometer), float(noise.encoder),
             noise.gyro_walk_sigma, noise.accelerometer_walk_sigma,
+            np.where(self.states.layout.turning, 1.0, 0.5 * (noise.base_sway / noise.encoder) ** 2),
         )  # fmt: skip
         return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
 
@@ -174,7 +188,7 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
     world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
     w, earth, up = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full), on_the_base(world.up, full)
     read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, up, full, layout.waves, world.axes, world.signs)
+    q = encoders_attitude(th, read, earth, up, full, layout, world.axes, world.signs)
     columns = empty_columns()
     count = encoder_columns(th, q, read, earth, up, full, layout, world.axes, world.signs, columns)
     slope = np.zeros((3, len(c)))

@@ -28,8 +28,7 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult, History
-from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, updating, watch
-from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, apart, updating, watch
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
 from inercal.selfcal.platform.linearised_rows import LinearisedRows, linearise_rows, linearise_steps
 from inercal.selfcal.platform.recording import Recording, Steps
@@ -43,7 +42,7 @@ class Measurements:
 
     ``acc`` (m, 3) [m/s^2], 0 where missing, with reciprocal standard deviations ``acc_weight``; ``attitude`` (m, 4)
     q_bp at the encoders' angles, with the Cholesky factor ``root`` (m, 3, 3) [rad] of its covariance about the axes of
-    p, ``sigma^2 (J J^T + 0.05^2 I)``, and ``whitening`` its inverse; ``used`` (m, 6) accelerometers and encoders.
+    p, ``sigma^2 J D J^T + floor I``, and ``whitening`` its inverse; ``used`` (m, 6) accelerometers and encoders.
     ``th`` (m, 3) [rad] as read, 0 where missing, and the ``steps`` before the rows.
     """
 
@@ -71,8 +70,10 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
-    covariance = joints @ np.swapaxes(joints, 1, 2) + LIMITS.encoder_floor**2 * np.eye(3)
-    root = np.asarray(problem.noise.encoder * np.linalg.cholesky(covariance))
+    noise = problem.model.noise
+    floor = np.array([apart(noise, dt, noise.encoder) for dt in recording.dt])[:, None, None]
+    of_joints = noise.encoder**2 * joints * noise.joints @ np.swapaxes(joints, 1, 2)
+    root = np.asarray(np.linalg.cholesky(of_joints + floor * np.eye(3)), dtype=np.float64)
     return Measurements(
         np.where(used[:, :3], acc, 0.0),
         used[:, :3] / _accelerometer_noise(recording, problem),

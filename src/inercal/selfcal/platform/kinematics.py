@@ -102,6 +102,11 @@ def joint_axes(th: Vector | Array, axes: Axes, signs: Array) -> tuple[Vector, Ve
     )
 
 
+def axes_of(th: Array, axes: Axes, signs: Array) -> NDArray[np.int64]:
+    """Axes (3,) of p, as 0, 1, 2, that the joints are nearest to at gimbal angles (3,) [rad]."""
+    return np.asarray(np.argmax(np.abs(joint_axes(th, axes, signs)), axis=1))
+
+
 @kernel
 def commanded_rates(th: Array, dt: float, earth: Array, axes: Axes, signs: Array, out: Array) -> None:
     """Rates ``out`` (n - 1, 3) [rad/s] of the platform against inertial space, in p, that take it from row to row.

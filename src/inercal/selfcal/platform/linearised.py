@@ -28,6 +28,7 @@ from inercal.selfcal.platform.kinematics import Axes, elementary, joint_axes, un
 from inercal.selfcal.platform.model import (
     Rates,
     Sensing,
+    about_turning,
     centripetal,
     platform_rate,
     rate_at,
@@ -53,6 +54,12 @@ Vectors: TypeAlias = tuple[Vector, Vector, Vector]
 
 FLOOR = LIMITS.encoder_floor
 """As kernels take it."""
+
+STIFF = LIMITS.stiff_share
+"""As kernels take it."""
+
+AXES = LIMITS.axes_known
+"""As kernels take it [rad]."""
 
 WALK_TIME = LIMITS.walk_time
 """As kernels take it [s]."""
@@ -264,7 +271,8 @@ def encoder_columns(
     for i in range(3):
         count = put(columns, count, place[SAG + i], cross(unit(i, 1.0), f), 1.0)
     w, v = platform_rate(rate_at(read, c[TAU]), c), rotate(to_p, earth)
-    return put(columns, count, place[TAU], (w[0] - v[0], w[1] - v[1], w[2] - v[2]), 1.0)
+    late = about_turning((w[0] - v[0], w[1] - v[1], w[2] - v[2]), th, layout.turning, axes, signs)
+    return put(columns, count, place[TAU], late, 1.0)
 
 
 @kernel
@@ -366,19 +374,22 @@ def rig_entries(
 
 
 @kernel
-def encoder_roots(th: Vector | Array, axes: Axes, signs: Array, sigma: float) -> tuple[Vectors, Vector]:
+def encoder_roots(
+    th: Vector | Array, axes: Axes, signs: Array, sigma: float, joints: Array, floor: float
+) -> tuple[Vectors, Vector]:
     """Inverse Cholesky factor (lower, rows) of the covariance of an encoder attitude, and its variances (3,).
 
-    The covariance is ``sigma^2 (J J^T + 0.05^2 I)`` [rad^2] about the axes of p, at gimbal angles ``th`` (3,).
+    The covariance is ``sigma^2 J D J^T + floor I`` [rad^2] about the axes of p, at gimbal angles ``th`` (3,), D the
+    diagonal matrix of ``joints`` (3,), the variance of each joint's angle over that of an encoder.
     """
     jx, jy, jz = joint_axes(th, axes, signs)
-    s = sigma * sigma
-    r00 = s * (jx[0] * jx[0] + jy[0] * jy[0] + jz[0] * jz[0] + FLOOR * FLOOR)
-    r11 = s * (jx[1] * jx[1] + jy[1] * jy[1] + jz[1] * jz[1] + FLOOR * FLOOR)
-    r22 = s * (jx[2] * jx[2] + jy[2] * jy[2] + jz[2] * jz[2] + FLOOR * FLOOR)
-    r10 = s * (jx[1] * jx[0] + jy[1] * jy[0] + jz[1] * jz[0])
-    r20 = s * (jx[2] * jx[0] + jy[2] * jy[0] + jz[2] * jz[0])
-    r21 = s * (jx[2] * jx[1] + jy[2] * jy[1] + jz[2] * jz[1])
+    s, dx, dy, dz = sigma * sigma, joints[0], joints[1], joints[2]
+    r00 = s * (dx * jx[0] * jx[0] + dy * jy[0] * jy[0] + dz * jz[0] * jz[0]) + floor
+    r11 = s * (dx * jx[1] * jx[1] + dy * jy[1] * jy[1] + dz * jz[1] * jz[1]) + floor
+    r22 = s * (dx * jx[2] * jx[2] + dy * jy[2] * jy[2] + dz * jz[2] * jz[2]) + floor
+    r10 = s * (dx * jx[1] * jx[0] + dy * jy[1] * jy[0] + dz * jz[1] * jz[0])
+    r20 = s * (dx * jx[2] * jx[0] + dy * jy[2] * jy[0] + dz * jz[2] * jz[0])
+    r21 = s * (dx * jx[2] * jx[1] + dy * jy[2] * jy[1] + dz * jz[2] * jz[1])
     l00 = math.sqrt(r00)
     l10, l20 = r10 / l00, r20 / l00
     l11 = math.sqrt(r11 - l10 * l10)

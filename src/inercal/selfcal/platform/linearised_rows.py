@@ -54,7 +54,7 @@ def linearise_rows(
         w, later = steps.rate[k], steps.later[k]
         read = Rates((w[0], w[1], w[2]), (later[0], later[1], later[2]))
         angles = (th[k, 0], th[k, 1], th[k, 2])
-        at = encoders_attitude(angles, read, earth_e, up_e, c, layout.waves, world.axes, world.signs)
+        at = encoders_attitude(angles, read, earth_e, up_e, c, layout, world.axes, world.signs)
         for i in range(4):
             out.of_encoders[k, i] = at[i]
         count = encoder_columns(angles, at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns)

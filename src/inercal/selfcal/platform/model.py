@@ -44,6 +44,7 @@ from inercal.selfcal.platform.states import (
     WARM,
     WAVE,
     ZERO_Y,
+    Layout,
 )
 
 
@@ -247,16 +248,46 @@ def encoders_attitude(
     earth: Vector,
     up: Vector,
     c: Array,
-    waves: NDArray[np.int64],
+    layout: Layout,
     axes: Axes,
     signs: Array,
 ) -> Quaternion:
     """Attitude of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc."""
     if len(c) > 24:
-        q = joints_attitude(without_harmonics(th, c, waves), c, axes, signs)
+        q = joints_attitude(without_harmonics(th, c, layout.waves), c, axes, signs)
         q = multiply(q, exp(sagging(q, up, c)))
-        return propagate(q, platform_rate(rate_at(read, c[TAU]), c), earth, c[TAU])
+        rate, tau = platform_rate(rate_at(read, c[TAU]), c), c[TAU]
+        if layout.turning.all():
+            return propagate(q, rate, earth, tau)
+        v = specific_force(q, earth)
+        by = about_turning((rate[0] - v[0], rate[1] - v[1], rate[2] - v[2]), th, layout.turning, axes, signs)
+        return multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
     return attitude(th, axes, signs)
+
+
+@kernel
+def about_turning(
+    rate: Vector, th: Vector | Array, turning: NDArray[np.bool_], axes: Axes, signs: Array
+) -> Vector:
+    """The part of a ``rate`` (3,) [rad/s] over the base, in p, that joints which are ``turning`` (3,) can have; what is
+    left is noise of the gyros."""
+    x, y, z = joint_axes(th, axes, signs)
+    if turning[0] and turning[1] and turning[2]:
+        return rate
+    first, second = (x if turning[0] else y if turning[1] else z), (z if turning[2] else y)
+    across = (
+        first[1] * second[2] - first[2] * second[1],
+        first[2] * second[0] - first[0] * second[2],
+        first[0] * second[1] - first[1] * second[0],
+    )
+    size = across[0] * across[0] + across[1] * across[1] + across[2] * across[2]
+    one = turning[0] + turning[1] + turning[2] == 1
+    if one or size < 1e-6:  # one axis, or two that coincide
+        of = x if turning[0] else y if turning[1] else z
+        along = rate[0] * of[0] + rate[1] * of[1] + rate[2] * of[2]
+        return along * of[0], along * of[1], along * of[2]
+    beside = (rate[0] * across[0] + rate[1] * across[1] + rate[2] * across[2]) / size
+    return rate[0] - beside * across[0], rate[1] - beside * across[1], rate[2] - beside * across[2]
 
 
 @kernel

@@ -40,7 +40,8 @@ class Recording:
     turns, the first row complete; ``acc`` (n, 3) [m/s^2], the first row not used. ``held``: steps whose rate was not
     recorded (`inercal.selfcal.filters.gaps`). ``temperature``: mean and standard deviation of the recorded one.
     ``reference`` (n, 4) q_bp by another instrument, or the truth of a simulation. ``warm`` (n,) [K] above the
-    temperature of the coefficients; None where it was not recorded.
+    temperature of the coefficients; None where it was not recorded. ``fixed`` joints 0, 1, 2 have no encoder, and one
+    angle.
     """
 
     t: Array
@@ -55,6 +56,7 @@ class Recording:
     walked: Array | None = None
     reference: Array | None = None
     warm: Array | None = None
+    fixed: tuple[int, ...] = ()
 
     @property
     def dt(self) -> Array:
@@ -76,5 +78,5 @@ class Recording:
 
     @property
     def scalars(self) -> int:
-        """Number of scalar measurements used: all but the first row's."""
+        """Number of scalar measurements used: all but the first row's; a fixed joint's angle is one."""
         return int(np.isfinite(self.th[1:]).sum() + np.isfinite(self.acc[1:]).sum())

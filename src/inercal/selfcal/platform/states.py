@@ -194,22 +194,25 @@ kg0, ka0, ka1; of harmonics a sine and a cosine of each; of walks gyros, acceler
 class Layout(NamedTuple):
     """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
     in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states; ``waves``
-    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0."""
+    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0; ``turning`` (3,) true of
+    joints that are not fixed."""
 
     chosen: NDArray[np.int64]
     place: NDArray[np.int64]
     stated: Array
     waves: NDArray[np.int64]
+    turning: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class StateVector:
-    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, and joint and
-    order of each of the ``harmonics``."""
+    """States of an estimator: their ``names``, the ``stated`` (K,) full vector of what is not estimated, joint and
+    order of each of the ``harmonics``; joints 0, 1, 2 that are ``fixed`` and have no encoder."""
 
     names: tuple[str, ...]
     stated: Array
     harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES
+    fixed: tuple[int, ...] = ()
 
     @property
     def index(self) -> NDArray[np.int64]:
@@ -226,7 +229,9 @@ class StateVector:
         slots = slice(WAVE, WAVE + 2 * len(self.harmonics))
         used = (place[slots] >= 0).any() or self.stated[slots].any()
         waves = np.array(self.harmonics if used else (), dtype=np.int64).reshape(-1, 2)
-        return Layout(index, place, self.stated[:size].copy(), waves)
+        return Layout(
+            index, place, self.stated[:size].copy(), waves, np.isin(np.arange(3), self.fixed, invert=True)
+        )
 
     def full(self, c: Array) -> Array:
         """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
@@ -262,13 +267,22 @@ _TWINS: Final[tuple[Mapping[str, str], ...]] = (
 )
 
 
-def twins(kinds: Sequence[str], fixed: Sequence[int]) -> tuple[str, ...]:
-    """Parameters of some kinds that are left out where joints ``fixed`` (0 outer, 1 inner, 2 platform) stand still: a
-    turn between two joints that move not against each other is one of gamma, or of beta."""
-    left = {name for joint in fixed for name, twin in _TWINS[joint].items() if twin in kinds}
-    if len(fixed) > 1 and {"gamma", "beta"} <= {*kinds}:
-        left = {"nonorth_xy", "nonorth_yz", "zero_y"}
-    return tuple(name for name in ALL if name in left and KIND_OF[name] in kinds)
+def twins(kinds: Sequence[str], still: Sequence[int], axes: Sequence[int]) -> dict[str, str]:
+    """Parameters of some kinds that are left out where joints ``still`` (0 outer, 1 inner, 2 platform) do not turn, and
+    the kind that each cannot be told from; ``axes`` (3,) of p that the joints lie along, or nearest to.
+
+    A turn between two joints that move not against each other is one of gamma, or of beta. Where one joint alone turns,
+    a turn about it of all that it carries is one of what carries it: gamma about its axis is left out.
+    """
+    left = {name: twin for joint in still for name, twin in _TWINS[joint].items() if twin in kinds}
+    if len(still) == 2 and {"gamma", "beta"} <= {*kinds}:
+        (moving,) = {0, 1, 2} - {*still}
+        left |= {"nonorth_xy": "beta" if moving else "gamma", "zero_y": "beta"}
+        left |= {
+            "nonorth_yz": "beta" if moving == 2 else "gamma",
+            STATES["gamma"].parameters[axes[moving]]: "beta",
+        }
+    return {name: left[name] for name in ALL if name in left and KIND_OF[name] in kinds}
 
 
 def state_vector(
@@ -276,8 +290,10 @@ def state_vector(
     stated: Array | None = None,
     left_out: Sequence[str] = (),
     harmonics: tuple[tuple[int, int], ...] = USUAL_WAVES,
+    fixed: tuple[int, ...] = (),
 ) -> StateVector:
-    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named."""
+    """The states of some kinds, in the order of the table, but those ``left_out`` and harmonics that are not named, of
+    a rig with joints that are ``fixed``."""
     without = {*left_out, *ALL[WAVE + 2 * len(harmonics) : WALK]}
     names = tuple(name for name in ALL if KIND_OF[name] in kinds and name not in without)
-    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics)
+    return StateVector(names, np.zeros(len(ALL)) if stated is None else stated, harmonics, fixed)

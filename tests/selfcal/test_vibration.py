@@ -1,0 +1,62 @@
+"""A platform in a vehicle, by a simulator that shares no code: what vibrates is noise, and stated as such."""
+
+import numpy as np
+from independent.selfcal import ARCSEC, NOMINAL, PPM, PRIOR, THREE, UG, Drive, Faults, study
+from independent.selfcal_driven import Place, driven
+from scipy.stats import chi2
+
+import inercal as ic
+from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.filters.run import estimate
+from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
+from inercal.selfcal.reading import recording_of
+
+IN_A_VEHICLE = Place(vibration=1000 * UG)
+STATED = 'vibration = "1000 ug"\nencoder'
+
+
+def record(rng, folder, truth, faults):
+    file = folder / "record.csv"
+    driven(rng, Drive(THREE), truth, NOMINAL, faults, IN_A_VEHICLE).write(file, ("temperature",))
+    return ic.read(file)
+
+
+def test_uncertainties_hold_in_a_vehicle(tmp_path):
+    """NEES of the coefficients over 8 draws, within limits that 1 in 10000 leaves."""
+    path = tmp_path / "s.toml"
+    path.write_text(study().replace("encoder", STATED))
+    settings, rng, total = ic.study(path).settings, np.random.default_rng(20261127), 0.0
+    of = problem(settings)
+    for _ in range(8):
+        truth = PRIOR * rng.standard_normal(18)
+        faults = Faults(
+            base=60 * ARCSEC * rng.standard_normal(3), gyro_scale=100 * PPM * rng.standard_normal(3),
+            gamma=20 * ARCSEC * rng.standard_normal(3), non_orthogonality=20 * ARCSEC * rng.standard_normal(2),
+        )  # fmt: skip
+        found = estimate(recording_of(record(rng, tmp_path, truth, faults), settings), of, history=False)
+        true = to_linear(np.concatenate([truth, faults.gyro_scale, faults.base]))
+        error = (found.coefficients[:24] - true)[:21]
+        assert of.names[:24] == EXTENDED
+        total += error @ np.linalg.solve(found.covariance[:21, :21], error)
+    low, high = chi2.ppf([5e-5, 1 - 5e-5], 8 * 21)
+    assert low < total < high
+
+
+def test_vibration_that_nobody_states_is_a_contradiction_and_stated_it_is_sound(tmp_path):
+    path, rng = tmp_path / "s.toml", np.random.default_rng(20261128)
+    made = record(rng, tmp_path, 0.3 * PRIOR * rng.standard_normal(18), Faults())
+    path.write_text(study().replace("encoder", STATED))
+    assert ic.calibrate(made, path).estimate.status.value == "ok"
+    path.write_text(study())
+    silent = ic.calibrate(made, path).estimate
+    assert silent.status.value == "inconsistent"
+
+
+def test_simulated_vibration_is_noise_of_the_accelerometers(tmp_path):
+    path = tmp_path / "s.toml"
+    plan = '[plan]\nturns = [["rest", "200 s"]]\n[truth]\nkg0 = ["0 deg/h", "0 deg/h", "0 deg/h"]\n'
+    path.write_text(study(more=plan + '[disturbances]\nvibration = "1 mg"\n'))
+    made = ic.simulate(path, np.random.default_rng(1))
+    spread = np.nanstd(made["acc_x"].si())
+    # 1000 samples: four standard errors
+    assert abs(spread / (1000 * UG) - 1.0) < 4.0 / np.sqrt(2000.0)
