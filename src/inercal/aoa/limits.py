@@ -196,6 +196,12 @@ class Limits:
     snap_ratio: float = 1.4
     """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
 
+    snap_excess: float = 0.08
+    """Excess of it over one from which a snap that is ten times as large is taken where it takes as much away."""
+
+    still_rows: int = 2000
+    """Rows of that still model, or as many as there are in 4 s."""
+
     low_pass_order: int = 4
     """Order of the low pass before the fusion."""
 

@@ -69,18 +69,18 @@ def choice_of(settings: AoaSettings, final: bool) -> Array:
     low = math.nan if band.low_pass is None else band.low_pass
     delay = settings.timing.gyro_delay_about, settings.prior.gyro_delay
     flexure = settings.prior.heave
-    shaken = flexure.frequency, flexure.damping, flexure.level
+    shaken = flexure.frequency, flexure.damping, flexure.level, float(flexure.vertical)
     rectified = settings.prior.rectified
     return np.array([float(final), band.rate, low, snap, *delay, *shaken, rectified, *band.notch])
 
 
 def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
     """The study with what was decided."""
-    _, rate, low, snap, about, rest, frequency, damping, level, rectified, *notch = choice.tolist()
+    _, rate, low, snap, about, rest, frequency, damping, level, vertical, rectified, *notch = choice.tolist()
     prior = replace(settings.prior, gyro_delay=rest, rectified=rectified)
-    heave = Resonance(frequency, damping, level)
+    heave = Resonance(frequency, damping, level, bool(vertical))
     if heave != prior.heave:
-        prior = replace(prior, heave=heave, axial=heave)
+        prior = replace(prior, heave=heave, axial=prior.axial if heave.vertical else heave)
     return replace(
         settings,
         band=Band(None if math.isnan(low) else low, tuple(notch), rate),

@@ -2,7 +2,8 @@
 
 The delay is that of the spectra, and the filter may learn what is left of it. Band and snap are judged by the
 innovations: taken is the widest band, and in it the smallest density of snap, under which innovations are nearly as
-small as those of a still model with the study's noise. So calm recordings keep all of their band and the usual snap.
+small as those of a still model with the study's noise, and a livelier model would not fit better than it does there.
+So calm recordings keep all of their band and the usual snap.
 Under too small a snap a buffet is taken for errors of positions and scale; under too large a one noise is taken for
 motion, and these errors are learned from it. Vibration that is no rotation fits under no snap: lines and what lies
 above the model's motion are taken out of all sensors alike.
@@ -11,8 +12,10 @@ above the model's motion are taken out of all sensors alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +40,7 @@ DENSITIES = (1e9, 1e10, 1e11, 1e12)
 """Densities [rad^2/s^7] beyond the usual one."""
 
 SHAKING = (0.03 * STANDARD_GRAVITY, 0.1 * STANDARD_GRAVITY)
-"""Levels [m/s^2] of flexure in a wide band that are tried beyond the usual one."""
+"""Levels [m/s^2] of flexure in a wide band that are tried beyond the usual one, of a plunge before both directions."""
 
 LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
 """Corners [Hz] of the low passes that are tried, the widest first."""
@@ -72,21 +75,53 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     for prior in (settings.prior, *_shaken(settings.prior)):
         for band in bands:
             tried = replace(fair, band=band, prior=prior)
-            limit = LIMITS.snap_ratio * _still(recording, tried)
-            for density in densities:
-                of = problem(_with_snap(tried, density), recording.spatial)
-                if all(_nis(of, part) < limit for part in stretches):
-                    return _with_snap(replace(settings, band=band, prior=prior), density)
+            if (density := _density(recording, stretches, tried, densities)) is not None:
+                return _with_snap(replace(settings, band=band, prior=prior), density)
     return plain
 
 
+def _density(
+    recording: Recording, stretches: Sequence[Recording], tried: AoaSettings, densities: Sequence[float]
+) -> float | None:
+    """The smallest density under which all stretches fit, and which a larger one does not better; None of none."""
+    limit = LIMITS.snap_ratio * _still(recording, tried)
+
+    @cache
+    def largest(density: float) -> float:
+        of, worst = problem(_with_snap(tried, density), recording.spatial), 0.0
+        for part in stretches:
+            worst = max(worst, _nis(of, part))
+            if not worst < limit:  # the others would not make it better
+                return math.inf
+        return worst
+
+    def excess(density: float) -> float:
+        return largest(density) / _still(recording, _with_snap(tried, density)) - 1.0
+
+    for density, livelier in pairwise((*densities, None)):
+        assert density is not None
+        if not largest(density) < limit:
+            continue
+        if livelier is None or (own := excess(density)) < LIMITS.snap_excess:
+            return density
+        if own - excess(livelier) < LIMITS.snap_excess:
+            return density
+    return None
+
+
 def _shaken(prior: Prior) -> Iterator[Prior]:
-    """Priors by which the support shakes the model more, in a wide band; none where flexure is stated."""
+    """Priors by which the support shakes the model more, in a wide band; none where flexure is stated.
+
+    A plunge comes first: it changes the size of gravity and not its direction, and costs hardly any u.
+    """
     usual = Prior()
-    if (prior.heave, prior.axial) == (usual.heave, usual.axial):
+    if (prior.heave, prior.axial) != (usual.heave, usual.axial):
+        return
+    frequency = 2.0 * math.pi * LIMITS.shaking_frequency
+    for vertical in (True, False):
         for level in SHAKING:
-            wide = Resonance(2.0 * math.pi * LIMITS.shaking_frequency, LIMITS.shaking_damping, level)
-            yield replace(prior, heave=wide, axial=wide)
+            wide = Resonance(frequency, LIMITS.shaking_damping, level, vertical)
+            yield replace(prior, heave=wide, axial=prior.axial if vertical else wide)
 
 
 def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
@@ -101,10 +136,14 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
         findings.append(Finding("band_limited", text))
     if flexure != settings.prior.heave:
         text = (
-            "the support shakes the model beyond its usual flexure, as by a plunge, and u allows for it: to have the "
-            f'same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", damping = '
-            f'"{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g" under [prior.heave] and '
-            "[prior.axial]"
+            f"the support {'plunges' if flexure.vertical else 'shakes the model beyond its usual flexure'}, and u "
+            f'allows for it: to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
+            f'damping = "{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g"'
+            + (
+                ', direction = "vertical" under [prior.heave]'
+                if flexure.vertical
+                else " under [prior.heave] and [prior.axial]"
+            )
         )
         findings.append(Finding("wide_flexure", text))
     return findings
@@ -272,7 +311,8 @@ def _nis(of: FilterProblem, part: Recording) -> float:
 def _still(recording: Recording, settings: AoaSettings) -> float:
     """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
     step = float(np.median(np.diff(recording.t[later(recording.t)])))
-    t = step * np.arange(round(2.0 * LIMITS.settling_time / step), dtype=float)
+    lasting = max(2.0 * LIMITS.settling_time, min(LIMITS.snap_time, LIMITS.still_rows * step))
+    t = step * np.arange(round(lasting / step), dtype=float)
     layout, rng = settings.layout, np.random.default_rng(0)
     up = settings.site.gravity * settings.attitude.level
     acc = np.tile(-up * np.sin(layout.angle), (len(t), 1))

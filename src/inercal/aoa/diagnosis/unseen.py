@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from inercal.aoa.diagnosis.effect import effect
 from inercal.aoa.diagnosis.fit_quality import stretch
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.findings import Finding
-from inercal.geometry.rotations import principal
 
 
 def unseen_scale(recording: Recording, problem: FilterProblem) -> list[Finding]:
@@ -28,16 +28,12 @@ def unseen_scale(recording: Recording, problem: FilterProblem) -> list[Finding]:
         return []
     plain = estimate(part, problem)
     off = estimate(replace(part, gyro=(1.0 + LIMITS.unseen_scale) * part.gyro), problem)
-    known = np.isfinite(plain.u) & np.isfinite(off.theta) & (part.t - part.t[:1] >= LIMITS.settling_time)
-    if not known.any() or off.nis_mean > LIMITS.mean_nis:
-        return []
-    shift = float(np.sqrt(np.mean(np.square(principal(off.theta - plain.theta)[known]))))
-    ratio = shift / float(np.median(plain.u[known]))
-    if not ratio > LIMITS.unseen_sigmas:
+    found = effect(plain, off, part.t)
+    if found is None or found.nis > LIMITS.mean_nis or not found.ratio > LIMITS.unseen_sigmas:
         return []
     text = (
         f"nothing in this motion would show a gyro whose scale is off by {100.0 * LIMITS.unseen_scale:g} %, which "
-        f"shifts the angle by {math.degrees(shift):.2g} deg, {ratio:.2g} times u: verify it, or state a wider "
-        "gyro_scale under [prior]"
+        f"shifts the angle by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u: verify it, or state a "
+        "wider gyro_scale under [prior]"
     )
     return [Finding("weak_test", text)]
