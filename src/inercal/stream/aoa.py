@@ -159,14 +159,14 @@ class Aoa:
         if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
-        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
+        readings = np.array([*values[:n], gyro, *zero_angle, roll, yaw])
         if self._waits(state):
-            state = kept(state, np.array([sample.t, *values[:n], gyro, *zero_angle, roll, yaw]))
+            state = kept(state, np.concatenate([[sample.t], readings]))
         if self._needs_rate and not state.choice.size:
             state, answers, turned = self._rated(state)
         else:
-            answers = self._live.feed(*read)
-            turned = [each.feed(*read).angles.theta for each in self._others]
+            answers = self._live.feed(sample.t, readings)
+            turned = [each.feed(sample.t, readings).angles.theta for each in self._others]
         state, outputs = self._lines(state._replace(live=self._live.state), answers, self._others, turned)
         if self._waits(state) and state.t - state.begun >= LIMITS.snap_time:
             state = self._decided(state)

@@ -12,13 +12,14 @@ import numpy as np
 from inercal.aoa.figures import sensors
 from inercal.aoa.layout import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import settled
 from inercal.aoa.result.outcome import term_of
 from inercal.arrays import Array
 from inercal.instruments.terms import shown_unit
 from inercal.report import innovations as white_noise
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
-from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms, settled
+from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
