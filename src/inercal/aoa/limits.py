@@ -224,6 +224,12 @@ class Limits:
     motion_power: float = 10.0
     """Spectral density of the gyro over its noise from which it counts as motion."""
 
+    calm_share: float = 0.1
+    """Root mean square of the flexure that is found, over what is usually allowed, up to which less is."""
+
+    calm_level: float = 0.3
+    """What is allowed then, over what is usual."""
+
     shaking_frequency: float = 4.0
     """Frequency [Hz] of flexure in a wide band."""
 

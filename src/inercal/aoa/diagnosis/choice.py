@@ -33,6 +33,7 @@ from inercal.aoa.paper.delay import Delay, relative_delay
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior, Resonance
+from inercal.arrays import Array
 from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
@@ -76,7 +77,8 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
         for band in bands:
             tried = replace(fair, band=band, prior=prior)
             if (density := _density(recording, stretches, tried, densities)) is not None:
-                return _with_snap(replace(settings, band=band, prior=prior), density)
+                fitting = _with_snap(replace(settings, band=band, prior=prior), density)
+                return _calmer(stretches, settings.prior, fitting)
     return plain
 
 
@@ -109,13 +111,48 @@ def _density(
     return None
 
 
+def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings) -> AoaSettings:
+    """The study with less flexure in each direction in which the fusion finds a tenth of the usual at most, in all
+    stretches, and the ``stated`` prior is the usual one: what is allowed for and is not there costs u, most at rest."""
+    usual, prior = Prior(), settings.prior
+    if not _usual_flexure(stated) or settings.estimator.states < 15:
+        return settings
+    found = np.max([_flexure(part, settings) for part in stretches], axis=0)
+    calm = [
+        each == before and rms < LIMITS.calm_share * each.level
+        for each, before, rms in zip(
+            (prior.heave, prior.axial), (usual.heave, usual.axial), found.tolist(), strict=True
+        )
+    ]
+    heave, axial = (
+        replace(each, level=LIMITS.calm_level * each.level) if less else each
+        for each, less in zip((prior.heave, prior.axial), calm, strict=True)
+    )
+    return replace(settings, prior=replace(prior, heave=heave, axial=axial))
+
+
+def _flexure(part: Recording, settings: AoaSettings) -> Array:
+    """Rms (2,) [m/s^2] of the flexure along z and x that the fusion of a stretch finds; infinite where none runs."""
+    part, of = limiting.fused(part, problem(settings, part.spatial))
+    kept, at = np.full((len(part.t), 2 * of.size), np.nan), of.places.resonators
+    advance(initial(of), of, part.t, part.rows, kept, last=True)
+    found = kept[part.t - part.t[:1] >= LIMITS.settling_time][:, [at + 1, at + 3]]
+    found = found[np.isfinite(found).all(axis=1)]
+    return np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else np.full(2, np.inf)
+
+
+def _usual_flexure(prior: Prior) -> bool:
+    """True where the study does not state flexure."""
+    usual = Prior()
+    return (prior.heave, prior.axial) == (usual.heave, usual.axial)
+
+
 def _shaken(prior: Prior) -> Iterator[Prior]:
     """Priors by which the support shakes the model more, in a wide band; none where flexure is stated.
 
     A plunge comes first: it changes the size of gravity and not its direction, and costs hardly any u.
     """
-    usual = Prior()
-    if (prior.heave, prior.axial) != (usual.heave, usual.axial):
+    if not _usual_flexure(prior):
         return
     frequency = 2.0 * math.pi * LIMITS.shaking_frequency
     for vertical in (True, False):
@@ -134,7 +171,7 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
             f"without it: to have the same band again write {band.words} under [band]"
         )
         findings.append(Finding("band_limited", text))
-    if flexure != settings.prior.heave:
+    if flexure.frequency != settings.prior.heave.frequency:
         text = (
             f"the support {'plunges' if flexure.vertical else 'shakes the model beyond its usual flexure'}, and u "
             f'allows for it: to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
