@@ -228,7 +228,7 @@ class Limits:
     """Root mean square of the flexure that is found, over what is usually allowed, up to which less is."""
 
     calm_level: float = 0.3
-    """What is allowed then, over what is usual."""
+    """Flexure that is allowed then, over the usual one."""
 
     shaking_frequency: float = 4.0
     """Frequency [Hz] of flexure in a wide band."""
@@ -339,6 +339,9 @@ class Limits:
     disagreeing_sigmas: float = 2.0
     """Standard uncertainties by which a coefficient of that fit differs from the study, to be listed."""
 
+    fit_ratio: float = 2.0
+    """Times the u of a bias by the fusion up to which the scale and the axis by a fit to a reference are used."""
+
     reference_creep: float = 1e-5
     """Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
 
@@ -362,6 +365,9 @@ class Limits:
 
     unseen_scale: float = 0.01
     """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
+
+    unseen_drift: float = 1e-3 * STANDARD_GRAVITY
+    """Drift [m/s^2] of an accelerometer's bias over a stretch that is tried: of a sensor that warms up."""
 
     unseen_sigmas: float = 2.0
     """Standard uncertainties by which it then shifts the angle, to be told."""

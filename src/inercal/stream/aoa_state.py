@@ -30,9 +30,9 @@ class AoaState(NamedTuple):
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
     last row with a number of the gyro, ``beyond`` [s] the last one with an angle beyond the limits (NaN before).
     ``watch`` is that of `inercal.aoa.fusion.watch`; of all ``rows`` that were answered ``unanswered`` have no angle.
-    ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided; ``choice``
-    is that (`choice_of`), empty before. ``remarked``: the findings on the sensors were given; ``slots`` that of the
-    last line.
+    ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided and the zero
+    is over; ``choice`` is that (`choice_of`), empty before, ``zeroed``: the zero was put in. ``remarked``: the findings
+    on the sensors were given; ``slots`` that of the last line.
     """
 
     live: LimitedState
@@ -48,6 +48,7 @@ class AoaState(NamedTuple):
     head: Array
     seen: int
     choice: Array
+    zeroed: bool
     remarked: bool
     alarms: Alarms
     slots: Slots

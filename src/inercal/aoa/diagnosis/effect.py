@@ -1,4 +1,4 @@
-"""What an error of the study would do to the angle, tried on a stretch: its size decides whether it harms.
+"""Effects of errors of a study on the angle, tried on a stretch: their size decides whether they harm.
 
 The stretch is filtered as the study has it, and again without the error. What u lacks is the shift of the angle, and
 what u would be more,
@@ -43,7 +43,7 @@ class Effect:
 
     @property
     def harm(self) -> tuple[str, ...]:
-        """What may be shifted by more than its u."""
+        """Names of all that may be shifted by more than its u: everything, or nothing."""
         return EVERYTHING if self.lack > 1.0 else ()
 
 
