@@ -3,7 +3,7 @@
 The delay is that of the spectra, and the filter may learn what is left of it. Band and snap are judged by the
 innovations: taken is the widest band, and in it the smallest density of snap, under which innovations are nearly as
 small as those of a still model with the study's noise, and a livelier model would not fit better than it does there.
-So calm recordings keep all of their band and the usual snap.
+So calm recordings keep all of their band and the usual snap. Lines come out before a larger snap is tried.
 Under too small a snap a buffet is taken for errors of positions and scale; under too large a one noise is taken for
 motion, and these errors are learned from it. Vibration that is no rotation fits under no snap: lines and what lies
 above the model's motion are taken out of all sensors alike.
@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,20 +72,28 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     densities = (usual,) if fixed else (usual, *DENSITIES)
     fair = _fair(stretches[0], settings)
     bands = (plain.band, *(() if stated else _bands(stretches[0], fair)))
+    # lines first: a snap that is large enough may take pick-up for motion
+    attempts = [(each, 1) for each in bands if not each.corner < math.inf]
+    attempts += [(each, len(densities)) for each in bands]
     # flexure last: what a wide one allows for is much, and u with it
     for prior in (settings.prior, *_shaken(settings.prior)):
-        for band in bands:
+        for band, most in attempts:
             tried = replace(fair, band=band, prior=prior)
-            if (density := _density(recording, stretches, tried, densities)) is not None:
+            if (density := _density(recording, stretches, tried, densities, most)) is not None:
                 fitting = _with_snap(replace(settings, band=band, prior=prior), density)
                 return _calmer(stretches, settings.prior, fitting)
     return plain
 
 
 def _density(
-    recording: Recording, stretches: Sequence[Recording], tried: AoaSettings, densities: Sequence[float]
+    recording: Recording,
+    stretches: Sequence[Recording],
+    tried: AoaSettings,
+    densities: Sequence[float],
+    most: int,
 ) -> float | None:
-    """The smallest density under which all stretches fit, and which a larger one does not better; None of none."""
+    """The smallest of the first ``most`` densities under which all stretches fit, and which a larger one does not
+    better; None of none."""
     limit = LIMITS.snap_ratio * _still(recording, tried)
 
     @cache
@@ -100,7 +108,7 @@ def _density(
     def excess(density: float) -> float:
         return largest(density) / _still(recording, _with_snap(tried, density)) - 1.0
 
-    for density, livelier in pairwise((*densities, None)):
+    for density, livelier in islice(pairwise((*densities, None)), most):
         assert density is not None
         if not largest(density) < limit:
             continue
