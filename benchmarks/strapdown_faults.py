@@ -55,7 +55,8 @@ CASES = {
     **{f"sway of {1e3 * size:g} mm/s at rest": ({"sway": size}, {}, {}) for size in (5e-4, 5e-3)},
     "a knock of 5 mm/s in a rest": ({"knock": 5e-3}, {}, {}),
     **{f"{count} samples lost in a turn": ({"lost": count}, {}, {}) for count in (1, 5)},
-    "gyro clips at 1.0 rad/s": ({"clip": 1.0}, {}, {}),
+    **{f"gyro clips at {rate} rad/s": ({"clip": rate}, {}, {}) for rate in (1.0, 1.2)},
+    **{f"gyros filtered, {1e3 * time:g} ms": ({"low_pass": time}, {}, {}) for time in (5e-3, 5e-2)},
     "gyros with 100 ppm of the square of 1 rad/s": ({"square": 1e-4}, {}, {}),
     "clock off by 50 ppm": ({"clock": 5e-5}, {}, {}),
 }
@@ -76,6 +77,7 @@ def estimated(seed, fault, changes, study):
     site = replace(SETTINGS.site, latitude=strapdown.LATITUDE + study.pop("wrong", 0.0))
     estimate = calibrate(record_of(columns, t), replace(SETTINGS, site=site, **study)).estimate
     truth = made.truth()
+    truth["tau_a"] -= fault.get("low_pass", 0.0)  # gyros that lag are accelerometers that lead
     return estimate, {
         name: (estimate[name].value - truth[name]) / estimate[name].u for name in estimate.names
     }

@@ -155,7 +155,7 @@ WITHIN = {
     ),
     "strapdown": (
         "limits coefficients settings kernels samples arrow simulate rests start batch bounds path_search design "
-        "budget left_out reading outcome task figures"
+        "budget left_out restricted reading outcome task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "

@@ -65,7 +65,8 @@ class Faults:
 
     ``ramp_gyro`` [rad/s] and ``ramp_acc`` [m/s^2] over the test, ``clip`` of the rate [rad/s], ``sway`` speed [m/s] of
     a slow motion that never rests, ``knock`` [m/s] that the accelerometers alone see in a rest, ``lost`` samples in the
-    middle of a turn whose stamps were made up, ``clock`` its relative error, ``square`` of a rate [s/rad].
+    middle of a turn whose stamps were made up, ``clock`` its relative error, ``square`` of a rate [s/rad], ``low_pass``
+    time constant [s] of a filter in the gyros that the accelerometers lack.
     """
 
     ramp_gyro: float = 0.0
@@ -76,6 +77,7 @@ class Faults:
     lost: int = 0
     clock: float = 0.0
     square: float = 0.0
+    low_pass: float = 0.0
 
 
 PATH = "y y y -y -y -y z x x x -x -x -x z z -z -z -z"
@@ -163,6 +165,12 @@ def record(rng, made, test, fault=Faults()):  # noqa: B008
     )
     part = (time - time.mean()) / time[-1]
     gyro, acc = gyro + fault.ramp_gyro * part[:, None], acc + fault.ramp_acc * part[:, None]
+    if fault.low_pass:
+        part_of_new = 1.0 - np.exp(-h / fault.low_pass)
+        smooth = gyro[0].copy()
+        for k in range(n):
+            smooth += part_of_new * (gyro[k] - smooth)
+            gyro[k] = smooth
     if fault.knock:
         begin = round((test.first + 5 * (test.turn + test.rest) + test.turn + 0.5 * test.rest) / h)
         acc[begin : begin + STEPS, 0] += fault.knock / (STEPS * h)

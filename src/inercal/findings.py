@@ -124,6 +124,7 @@ CODES: dict[str, Code] = {
     "rectification": Code("vibration makes an offset of the accelerometers", _BY_SIZE),
     "unmodelled": Code("the recording shows errors that the model leaves out", _BY_SIZE, rank=9),
     "site_suspect": Code("earth rate or gravity does not fit the stated site", _BY_SIZE, rank=10),
+    "turn_noise": Code("attitude and velocity over turns close less well than the stated noise says", _NEVER),
     "low_scatter": Code("the scatter of the residuals is below what the stated noise explains", _NEVER),
     "prior_suspect": Code("a value is far outside what its prior allows", _ALWAYS, rank=11),
     "filter_fails": Code("an estimator fails on a sound recording", _ALWAYS, rank=13),

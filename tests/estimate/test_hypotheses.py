@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from inercal.estimate.hypotheses import Hypothesis, least_squares, likeliest, refitted, search, sigmas, tried
+from inercal.estimate import hypotheses
+from inercal.estimate.hypotheses import (
+    Hypothesis,
+    least_squares,
+    likeliest,
+    normal_equations,
+    refitted,
+    search,
+    sigmas,
+    tried,
+)
 
 T = np.linspace(-1.0, 1.0, 40)
 N = len(T)
@@ -152,10 +162,30 @@ def test_what_has_no_effect_is_not_fitted():
         Z = rng.standard_normal((50, 6, 8)) * 10.0 ** rng.uniform(0.0, 8.0, 8)
         Z[..., 6] = 0.0
         values = rng.standard_normal(8)
-        fit = least_squares(Z, rng.standard_normal((50, 6)), values, np.full(8, np.inf))
+        fit = least_squares(normal_equations([Z], rng.standard_normal((50, 6))), values, np.full(8, np.inf))
         assert fit.change[6] == 0.0
         assert np.isfinite(fit.u).all()
         others = np.delete(Z, 6, axis=-1).reshape(300, 7)
         size = np.linalg.norm(others, axis=0)
         u = np.sqrt(fit.left * np.diag(np.linalg.inv((others / size).T @ (others / size)))) / size
         np.testing.assert_allclose(np.delete(fit.u, 6), u, rtol=1e-9)
+
+
+def test_columns_beside_others_are_those_of_all_together():
+    """The normal equations put together for one hypothesis after the other, also where residuals are left out that
+    only its own columns lack."""
+    rng = np.random.default_rng(5)
+    z, held = rng.standard_normal((40, 6)), [rng.standard_normal((40, 6, m)) for m in (2, 3)]
+    z[3, 2], held[1][7, 1, 0] = np.nan, np.nan
+    beside = hypotheses._Beside(held, z)
+    for gone in (False, True):
+        more = rng.standard_normal((40, 6, 2))
+        more[3, 2] = np.nan
+        more[9, 5, 1] = np.nan if gone else 1.0
+        whole = np.concatenate([*held, more], axis=-1).reshape(240, 7)
+        used = np.isfinite(z.ravel()) & np.isfinite(whole).all(axis=1)
+        whole, of = whole[used], z.ravel()[used]
+        found = beside.and_with(more)
+        np.testing.assert_allclose(found.matrix, whole.T @ whole, rtol=1e-12)
+        np.testing.assert_allclose(found.right, whole.T @ of, rtol=1e-12, atol=1e-12)
+        assert (found.rows, found.square) == (len(of), pytest.approx(float(of @ of)))

@@ -14,6 +14,7 @@ from inercal.imu.turns import (
     first_guess,
     increments,
     thin,
+    whole_turns,
 )
 from inercal.instruments.triad import TriadModel
 
@@ -43,14 +44,16 @@ def test_the_true_model_undoes_output_and_leaves_rotation_vectors():
     np.testing.assert_allclose(phi.transpose(1, 0, 2).reshape(-1, 3), mean, atol=1e-12)
 
 
-def test_attitudes_are_products_of_rotations_as_scipy_makes_them():
-    phi = RNG.normal(0, 0.3, (50, 3, 3))
+@pytest.mark.parametrize("count", [1, 2, 50, 63])
+def test_attitudes_are_products_of_rotations_as_scipy_makes_them(count):
+    phi = RNG.normal(0, 0.3, (count, 3, 3))
     R = attitudes(phi)
     for m in range(3):
         product = Rotation.identity()
-        for i in range(50):
+        for i in range(count):
             product = product * Rotation.from_rotvec(phi[i, m])
         np.testing.assert_allclose(R[-1, m], product.as_matrix(), atol=1e-12)
+        np.testing.assert_allclose(whole_turns(phi)[m], product.as_matrix(), atol=1e-12)
     np.testing.assert_allclose(R[1, 0], to_matrix(exp(phi[0, 0])), atol=1e-14)
 
 

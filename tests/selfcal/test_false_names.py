@@ -83,7 +83,7 @@ def test_a_walk_larger_than_stated_is_told_with_the_range_that_fits(factor):
     # by steps of half an octave, and more where the walk hides below the noise of encoders
     assert abs(np.log2(about / factor)) < 1.0
     if "(" in message:
-        low, high = (float(each) for each in message.split("(")[1].strip(")").split(" to "))
+        low, high = (float(each) for each in message.split("(")[1].split(")")[0].split(" to "))
         assert low / np.sqrt(2.0) < factor < high * np.sqrt(2.0)
 
 
@@ -146,3 +146,16 @@ def test_readings_that_freeze(sensors, words):
     found = only(named(made), "dead_channel")
     assert found.message == words
     assert found.where == "rows 202-231"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("floor", "words"), [(2.0, "explain the innovations"), (5.0, "as with 1/f noise")])
+def test_flicker_of_accelerometers_is_no_walk_of_the_gyros(floor, words):
+    """Noise of both is no Markov process: the stronger it is, the less a bias that walks makes innovations white."""
+    noisy = replace(STUDY, disturbances=Disturbances(flicker=floor * MICRO_G))
+    found = only(named(recorded(noisy)), "unmodelled")
+    assert found.message.startswith(
+        ("accelerometer biases that wander", "most of the innovations look like accelerometer")
+    )
+    assert words in found.message
+    assert "name bias_walk" in found.message

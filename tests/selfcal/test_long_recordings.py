@@ -1,21 +1,21 @@
-"""Recordings of hours: what the judge of the diagnosis computes by chunks is what it computes at once."""
+"""Recordings of hours: filters by chunks give what they give at once, and means over blocks say what rows say."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from paper_study import study
+from paper_study import ARCSEC, study
 
-from inercal.selfcal.before import considered
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis import fit_quality, small
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, filtered
-from inercal.selfcal.diagnosis.rig_errors import rig_errors
-from inercal.selfcal.filters import run
+from inercal.selfcal.diagnosis import small
+from inercal.selfcal.diagnosis.small import small_errors
+from inercal.selfcal.filters import averaged, run
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.settings import Filter, Noise
 
 SETTINGS = study("best")
 OF = problem(SETTINGS)
@@ -45,41 +45,79 @@ def test_by_chunks_as_at_once(chunk, monkeypatch):
     assert_array_equal(estimate(recording, OF, history=False, brief=True).nis, whole.nis)
 
 
-def test_joints_by_chunks_as_at_once(monkeypatch):
+def few(monkeypatch, rows=400):
+    """Blocks of rows as a recording of hours has them, for one of minutes."""
+    monkeypatch.setattr(averaged, "LIMITS", replace(LIMITS, judged_rows=rows))
+
+
+@pytest.mark.parametrize("size", [3, 7])
+def test_means_over_blocks_say_what_all_rows_say(size, monkeypatch):
+    """The filter finds the same coefficients, with the same u, from a seventh of the rows; each block turns by 1.4 deg,
+    some end or begin a turn, and some hold rows that no encoder read."""
     recording = recorded()
-    now = estimate(recording, OF, brief=True)
-    whole = small._found_angles((recording, OF), now)
-    monkeypatch.setattr(small, "_CHUNK", 512)
-    for mine, theirs in zip(small._found_angles((recording, OF), now), whole, strict=True):
-        assert_array_equal(mine, theirs)
+    of = OF if size == 3 else problem(study("best", filter=Filter(extended=True)))
+    whole = estimate(recording, of, brief=True)
+    few(monkeypatch, len(recording.t) // size + 1)
+    shorter, posed = averaged.averaged(recording, of, whole)
+    assert len(shorter.t) == len(recording.t) // size
+    assert posed.noise.encoder == pytest.approx(of.noise.encoder / np.sqrt(size))
+    found = estimate(shorter, posed, brief=True)
+    u = np.sqrt(np.diag(whole.covariance))
+    more = np.diag(found.covariance) / u**2 - 1.0
+    assert np.all((more > -1e-3) & (more < 0.03))
+    # what another estimator of the same knows less is the variance of its difference
+    apart = (found.coefficients - whole.coefficients) / u
+    assert np.all(np.abs(apart) < 4.0 * np.sqrt(np.maximum(more, 0.0)) + 0.05)
+    scatter = np.sqrt(12.0 / len(found.nis))
+    assert np.nanmean(found.nis) == pytest.approx(np.nanmean(whole.nis), abs=4.0 * scatter)
 
 
-def sums_of(values, used, size):
-    """Sums of so many rows, over the root of those used; NaN where there are none."""
-    rows = []
-    for first in range(0, len(values), size):
-        some, of = values[first : first + size], used[first : first + size]
-        count = of.sum(axis=0)
-        total = np.where(of.reshape(*of.shape, *[1] * (values.ndim - 2)), some, 0.0).sum(axis=0)
-        count = np.where(count > 0, count, np.nan).reshape(*count.shape, *[1] * (values.ndim - 2))
-        rows.append(total / np.sqrt(count))
-    return np.array(rows)
+def test_without_noise_a_mean_is_a_reading(monkeypatch):
+    """Through turns and their ends, the angles and forces of a block are those of its middle row."""
+    quiet = replace(SETTINGS, noise=Noise(1e-12, 1e-12, 1e-12))
+    recording = simulate(experiment(quiet), np.random.default_rng(1)).recording
+    of = problem(SETTINGS)
+    found = estimate(recording, of, brief=True)
+    truth = to_linear(SETTINGS.true_values[:18])
+    few(monkeypatch)
+    shorter, _ = averaged.averaged(recording, of, replace(found, coefficients=truth))
+    middle = np.searchsorted(recording.t, shorter.t)
+    assert_allclose(shorter.th, recording.th[middle], atol=5e-9)
+    assert_allclose(shorter.acc[1:], recording.acc[middle][1:], atol=1e-8)
 
 
-def test_small_errors_are_sought_in_sums_of_rows(monkeypatch):
-    """Residuals and columns of the judge, of a recording that is too long for it, are sums of those of its rows."""
-    case = recorded(), OF
-    now = filtered(case)
-    z = JUDGE.residuals(case)
-    used = np.isfinite(z)
-    each = next(error for error in rig_errors(case, now) if error.name == "gamma")
-    columns = each.derivative(case)
-    monkeypatch.setattr(considered, "_CHUNK", 500)
-    at_once = next(error for error in rig_errors(case, now) if error.name == "gamma").derivative(case)
-    assert_allclose(at_once, columns, rtol=1e-9, atol=1e-6 * np.nanmax(np.abs(columns)))
-    monkeypatch.setattr(fit_quality, "LIMITS", replace(LIMITS, judged_rows=400))
-    size = fit_quality.together(case[0])
-    assert size == 7
-    assert_allclose(JUDGE.residuals(case), sums_of(z, used, size), atol=1e-12)
-    found = next(error for error in rig_errors(case, now) if error.name == "gamma").derivative(case)
-    assert_allclose(found, sums_of(columns, used, size), atol=1e-6 * np.nanmax(np.abs(columns)))
+def test_nothing_is_averaged_over_a_wide_turn(monkeypatch):
+    recording = recorded()
+    few(monkeypatch, 20)
+    monkeypatch.setattr(averaged, "LIMITS", replace(averaged.LIMITS, block_turn=np.radians(1.0)))
+    assert averaged.block(recording) * 0.2 < 1.0 + 1e-9
+
+
+def test_small_errors_are_those_of_all_rows(monkeypatch):
+    """An error of the base and one of an encoder are found in means over blocks, as large as in all rows, and taken out
+    of these."""
+    made = recorded()
+    th = made.th.copy()
+    th[:, 2] += 6.0 * ARCSEC * np.sin(3.0 * th[:, 2])
+    case = replace(made, th=th), OF
+    (whole,), _ = small_errors(case)
+    few(monkeypatch)
+    (found,), (repaired, _) = small_errors(case)
+    assert found.hypothesis.name == whole.hypothesis.name == "harmonic 3 of th_z"
+    assert_allclose(found.values, whole.values, atol=0.3 * whole.u.max())
+    assert_allclose(found.u, whole.u, rtol=0.2)
+    missed = (repaired.th - made.th)[np.isfinite(made.th).all(axis=1)]
+    assert np.abs(missed).max() < 5.0 * whole.u.max()
+
+
+def test_late_commands_turn_the_platform_as_much_in_all():
+    """Rates of steps are mixed with those before by the part of the step by which they are late."""
+    recording = recorded()
+    dt = recording.dt[0]
+    rate = recording.rate
+    for part in (0.3, -0.3):
+        late, _ = small._delayed((recording, OF), np.array([part * dt]))
+        before = np.vstack([rate[:1], rate[:-1]]) if part > 0.0 else np.vstack([rate[1:], rate[-1:]])
+        assert_allclose(late.rate, rate + 0.3 * (before - rate), atol=1e-12)
+    two, _ = small._delayed((recording, OF), np.array([2.0 * dt]))
+    assert_allclose(two.rate[2:], rate[:-2], atol=1e-12)

@@ -156,7 +156,10 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
 
     rows = np.ascontiguousarray(np.moveaxis(W, 0, 2))
     chosen, n = first.copy(), len(first)
-    state = _state(rows, p, weights, chosen)
+    d = W.shape[2]
+    all_rows = W[chosen].reshape(-1, d)
+    M = all_rows.T @ all_rows + np.diag(np.repeat([0.0, 1.0], [p, d - p]))
+    state = _state(rows, p, weights, M)
     taken = np.zeros(len(W), dtype=bool)
     taken[chosen] = not repeats
     k, unchanged = 0, 0
@@ -165,8 +168,9 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
         unchanged += 1
         if improves(factor):
             taken[chosen[k]], taken[best] = False, not repeats
+            M += W[best].T @ W[best] - W[chosen[k]].T @ W[chosen[k]]
             chosen[k], unchanged = best, 0
-            state = _state(rows, p, weights, chosen)
+            state = _state(rows, p, weights, M)
         k = (k + 1) % n
     return chosen
 
@@ -179,19 +183,18 @@ def _first_least(values: Array) -> int:
     return int(np.argmax(values <= least + TIE * abs(least)))
 
 
-def _state(rows: Array, p: int, weights: Array | None, chosen: Indices) -> State:
-    """Quantities that the exchanges of a design use; ``rows`` (c, d, m) of the candidates."""
+def _state(rows: Array, p: int, weights: Array | None, M: Array) -> State:
+    """Quantities that the exchanges of a design of information ``M`` use; ``rows`` (c, d, m) of the candidates."""
     from inercal.designs.exchange_kernel import State, along, own_products, update
 
     c, d, _ = rows.shape
-    taken = np.moveaxis(rows[..., chosen], 1, 2).reshape(-1, d)
-    M = taken.T @ taken + np.diag(np.repeat([0.0, 1.0], [p, d - p]))
     P = np.asarray(np.linalg.inv(M), dtype=float)
     whole = update(rows, P)
-    errors = np.ascontiguousarray(rows[:, p:])
-    common = update(errors, np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
+    common = whole
+    if d > p:
+        common = update(np.ascontiguousarray(rows[:, p:]), np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
     if weights is None:
         none = np.empty((c, d, 0))
-        return State(whole, common, none, none, 0.0)
+        return State(whole, common, d > p, none, none, 0.0)
     H = along(whole.G, weights)
-    return State(whole, common, H, own_products(H, whole.G), float(np.sum(P * weights)))
+    return State(whole, common, d > p, H, own_products(H, whole.G), float(np.sum(P * weights)))

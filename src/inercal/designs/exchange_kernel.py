@@ -32,12 +32,13 @@ class Update(NamedTuple):
 
 
 class State(NamedTuple):
-    """A design on its way: of the ``whole`` information and of the constant errors alone (``common``, without columns
-    where there are none); for the trace H = G weights (c, d, m) and K = H_j G_j^T (c, c, m), empty for the determinant,
+    """A design on its way: of the ``whole`` information and, where ``errors`` are common to positions, of those alone
+    (``common``); for the trace H = G weights (c, d, m) and K = H_j G_j^T (c, c, m), empty for the determinant,
     and the ``trace`` itself."""
 
     whole: Update
     common: Update
+    errors: bool
     H: Array
     K: Array
     trace: float
@@ -83,7 +84,7 @@ def own_products(left: Array, right: Array) -> Array:
 def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
     """The candidate, not one ``taken`` (m,), that lessens the criterion most in the place of i, the first of equals,
     and its factor of the determinant or trace of the covariance."""
-    whole, common, H, K_own, trace = state
+    whole, common, errors, H, K_own, trace = state
     A, inverse, ratio = _removed(whole, i)
     m = len(ratio)
     factors = np.full(m, np.inf)
@@ -93,7 +94,9 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
             if ratio[j] > _SINGULAR and not taken[j]:
                 factors[j] = 1.0 + more[j] / trace
     else:
-        _, _, less = _removed(common, i)
+        less = np.ones(m)
+        if errors:
+            less = _removed(common, i)[2]
         for j in range(m):
             if ratio[j] > _SINGULAR and not taken[j]:
                 factors[j] = less[j] / ratio[j]

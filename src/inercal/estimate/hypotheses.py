@@ -202,13 +202,14 @@ def _ranked(
         return []
     z, share = judge.residuals(case), risk / len(asked)
     held = [slopes(case, each.hypothesis, z, judge) for each in fitted]
-    before = _least_squares_of(held, z, fitted).gained if held else 0.0
+    beside = _Beside(held, z)
+    before = _solved(beside.normal, fitted).gained if held else 0.0
 
     def surplus(each: Hypothesis[Case]) -> float:
         one = tried(each, case)
         if not each.parameters:
             return judge.misfit(case) - judge.misfit(one.case) - each.chance(share)
-        after = _least_squares_of([*held, slopes(case, each, z, judge)], z, [*fitted, one])
+        after = _solved(beside.and_with(slopes(case, each, z, judge)), [*fitted, one])
         with np.errstate(over="ignore", invalid="ignore"):  # numbers of no use explain nothing
             gain = (after.gained - before) / after.left - each.chance(share)
         return gain if math.isfinite(gain) else -math.inf
@@ -236,7 +237,8 @@ def refitted(case: Case, fitted: Sequence[Fitted[Case]], judge: Judge[Case]) -> 
     ends = np.cumsum([len(each.values) for each in fits])[:-1]
     for _ in range(ROUNDS):
         z = judge.residuals(now)
-        fit = _least_squares_of([slopes(now, each.hypothesis, z, judge) for each in fits], z, fits)
+        columns = [slopes(now, each.hypothesis, z, judge) for each in fits]
+        fit = _solved(normal_equations(columns, z), fits)
         parts = zip(fits, np.split(fit.change, ends), np.split(fit.u, ends), strict=True)
         fits = [Fitted(each.hypothesis, each.values + change, u, case) for each, change, u in parts]
         now = _without(case, fits)
@@ -268,11 +270,64 @@ def slopes(case: Case, hypothesis: Hypothesis[Case], z: Array, judge: Judge[Case
     return out
 
 
-_BLOCK = 1 << 18
+_BLOCK = 1 << 16
 """Residuals that are squared at once."""
 
 _LONG = 1 << 20
 """Residuals from which their derivatives are kept to seven digits."""
+
+
+class Normal(NamedTuple):
+    """Normal equations of ``z + Z x``, x (m,): ``matrix`` (m, m) is Z^T Z, ``right`` (m,) Z^T z, ``square`` z^T z, over
+    ``rows`` residuals."""
+
+    matrix: Array
+    right: Array
+    square: float
+    rows: int
+
+
+def normal_equations(parts: Sequence[Array], z: Array) -> Normal:
+    """Normal equations of residuals ``z`` (...) by ``parts`` (..., m_i) together, without those that are NaN in any."""
+    m, z = sum(each.shape[-1] for each in parts), z.reshape(-1)
+    columns = [each.reshape(z.size, each.shape[-1]) for each in parts]
+    total = Normal(np.zeros((m, m)), np.zeros(m), 0.0, 0)
+    for first in range(0, len(z), _BLOCK):
+        own = z[first : first + _BLOCK]
+        some = np.hstack([np.empty((len(own), 0)), *(each[first : first + _BLOCK] for each in columns)])
+        used = np.isfinite(own) & np.isfinite(some).all(axis=-1)
+        some, own = (some, own) if used.all() else (some[used], own[used])
+        total = Normal(
+            total.matrix + some.T @ some,
+            total.right + some.T @ own,
+            total.square + float(own @ own),
+            total.rows + len(own),
+        )
+    return total
+
+
+class _Beside:
+    """Normal equations of ``held`` columns and those of one hypothesis after the other beside them."""
+
+    def __init__(self, held: Sequence[Array], z: Array) -> None:
+        self._held, self._z = held, z
+        self.normal = normal_equations(held, z)
+        self._used = np.isfinite(z.reshape(-1))
+        for each in held if z.size <= _LONG else ():
+            self._used &= np.isfinite(each).reshape(z.size, -1).all(axis=1)
+        short = z.size <= _LONG  # of a longer one there is no room for a copy
+        parts = [each.reshape(z.size, -1)[self._used] for each in held] if short else []
+        self._columns = np.hstack([np.empty((int(self._used.sum()), 0)), *parts]) if short else None
+
+    def and_with(self, columns: Array) -> Normal:
+        """Those of the held columns and some (..., m) more."""
+        z = self._z.reshape(-1)
+        own = None if self._columns is None else columns.reshape(z.size, -1)[self._used]
+        if self._columns is None or own is None or not np.isfinite(own).all():
+            return normal_equations([*self._held, columns], self._z)
+        across, right = self._columns.T @ own, own.T @ z[self._used]
+        matrix = np.block([[self.normal.matrix, across], [across.T, own.T @ own]])
+        return self.normal._replace(matrix=matrix, right=np.append(self.normal.right, right))
 
 
 class LeastSquares(NamedTuple):
@@ -285,27 +340,17 @@ class LeastSquares(NamedTuple):
     gained: float
 
 
-def _least_squares_of(parts: Sequence[Array], z: Array, fitted: Sequence[Fitted[Case]]) -> LeastSquares:
+def _solved(normal: Normal, fitted: Sequence[Fitted[Case]]) -> LeastSquares:
     """Least squares of the fitted hypotheses, with their priors."""
     values = np.concatenate([each.values for each in fitted])
     prior = np.concatenate([np.full(len(each.values), each.hypothesis.prior) for each in fitted])
-    return least_squares(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1), z, values, prior)
+    return least_squares(normal, values, prior)
 
 
-def least_squares(Z: Array, z: Array, values: Array, prior: Array) -> LeastSquares:
-    """Change from ``values`` (m,) that makes ``z + Z change`` and their misfit to their ``prior`` (m,) smallest.
-
-    ``z`` (...) and ``Z`` (..., m) may hold NaN; combinations without effect stay as they are.
-    """
-    m = Z.shape[-1]
-    Z, z = Z.reshape(z.size, m), z.reshape(-1)
-    normal, right, square, count = np.zeros((m, m)), np.zeros(m), 0.0, 0
-    for first in range(0, len(z), _BLOCK):
-        some, own = Z[first : first + _BLOCK], z[first : first + _BLOCK]
-        used = np.isfinite(own) & np.isfinite(some).all(axis=-1)
-        some, own = some[used].astype(np.float64), own[used]
-        normal, right = normal + some.T @ some, right + some.T @ own
-        square, count = square + float(own @ own), count + len(own)
+def least_squares(equations: Normal, values: Array, prior: Array) -> LeastSquares:
+    """Change from ``values`` (m,) that makes ``z + Z change`` and their misfit to their ``prior`` (m,) smallest;
+    combinations without effect stay as they are."""
+    normal, right, square, count = equations
     weight = math.sqrt(max(1.0, square / max(count, 1))) / prior
     normal, right = normal + np.diag(weight**2), right + weight**2 * values
     square += float(np.square(weight * values).sum())

@@ -110,6 +110,15 @@ def attitudes(phi: Array) -> Array:
     return out
 
 
+def whole_turns(phi: Array) -> Array:
+    """The last of `attitudes` alone (m, 3, 3): products of neighbours, then of their products, and so on."""
+    R = _rotation_matrices(phi)
+    while len(R) > 1:
+        pairs = len(R) // 2
+        R = np.concatenate([R[: 2 * pairs : 2] @ R[1 : 2 * pairs : 2], R[2 * pairs :]])
+    return np.asarray(R[0])
+
+
 def _rotation_matrices(phi: Array) -> Array:
     """exp(phi) (..., 3, 3) by Rodrigues' formula; sinc keeps it exact at zero."""
     angle = np.linalg.norm(phi, axis=-1)
@@ -129,7 +138,7 @@ def _polynomial(phi: Array, one: Array | float, first: Array | float, second: Ar
 
 def carried(turns: Turns, verticals: Array, model: TriadModel, drift: Array) -> Array:
     """The vertical (m, 3) at the end of each turn, from ``verticals`` (poses, 3) at its start."""
-    R = attitudes(increments(turns, model, drift))[-1]
+    R = whole_turns(increments(turns, model, drift))
     return np.asarray(np.einsum("mji,mj->mi", R, verticals[turns.first]))
 
 

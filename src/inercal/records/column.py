@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,7 +69,7 @@ class Triad:
     values: Array
     source: Source
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Median sample rate [Hz]; NaN where the stamps do not increase."""
         step = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0

@@ -151,6 +151,9 @@ class Limits:
     nearly_white: float = 1e-6
     """Probability of innovations as correlated, by chance, from which states of the rig explain them."""
 
+    left_over: float = 0.25
+    """Part of what innovations are off, in mean square or correlation, that a walk may leave of 1/f noise."""
+
     alike_misfit: float = 6.0
     """Sum of squares by which a constant error may explain less than the likeliest and still be called as possible."""
 
@@ -158,11 +161,10 @@ class Limits:
     """Constant errors that are fitted to see which are alike."""
 
     judged_rows: int = 1 << 15
-    """Rows whose innovations small errors are sought in; of a longer recording so many sums of rows that follow each
-    other: what is constant over hours is the same in a tenth of a second."""
+    """Rows whose innovations small errors are sought in; a longer recording is averaged over blocks of rows before."""
 
-    columns_at_once: int = 1 << 23
-    """Angles that are judged times parameters, up to which their columns are found in one run."""
+    block_turn: float = math.radians(20.0)
+    """Turn [rad] within a block of rows, at most."""
 
     sway_bands: int = 100
     """Bands of frequency, in one of which the sway of a base lies."""

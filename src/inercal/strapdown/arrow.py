@@ -213,9 +213,10 @@ def completed(row: Array, i: int, Z: Array) -> None:
 
 
 @kernel
-def explained(chain: Chain, k: int, m: int, Z: Array, row: Array) -> float:
-    """Part of the m rows of interval k that the unknowns of covariance ``Z`` (n, n) follow: the trace of W A Z A^T."""
-    n, total = len(Z), 0.0
+def explained(chain: Chain, k: int, m: int, Z: Array, row: Array, out: Array, coupled: Array) -> None:
+    """Covariance ``out`` (m, m) of what the unknowns of covariance ``Z`` (n, n) say of interval k, A Z A^T, and that
+    ``coupled`` (m, p) with the coefficients, A Z."""
+    n = len(Z)
     for b in range(m):
         for j in range(n):
             # column j of A Z, row b
@@ -231,14 +232,16 @@ def explained(chain: Chain, k: int, m: int, Z: Array, row: Array) -> float:
                 value -= chain.F[k, a, i] * row[i]
             for i in range(n - 2 * m - 3):
                 value -= chain.G[k, a, i] * row[2 * m + 3 + i]
-            total += chain.W[k, a, b] * value
-    return total
+            out[a, b] = value
+        for i in range(n - 2 * m - 3):
+            coupled[b, i] = row[2 * m + 3 + i]
 
 
 @kernel
-def followed(chain: Chain, rows: Array, Z: Array, out: Array) -> None:
-    """Numbers ``out`` (k,) of degrees of freedom of each interval that the solution follows; ``Z`` (n, n) begins with
-    the covariance (p, p) of the coefficients at its end and zeros before."""
+def followed(chain: Chain, rows: Array, Z: Array, out: Array, coupled: Array, nodes: Array) -> None:
+    """Covariance ``out`` (k, m, m) of what the solution says of each interval, and with the coefficients that of each
+    interval ``coupled`` (k, m, p) and of each node and the reference of its rest ``nodes`` (k + 1, m + 3, p); ``Z``
+    (n, n) begins with the covariance (p, p) of the coefficients at its end and zeros before."""
     m, n = chain.F.shape[1], len(Z)
     row = np.zeros(n)
     for k in range(len(chain.rest) - 1, -1, -1):
@@ -248,7 +251,10 @@ def followed(chain: Chain, rows: Array, Z: Array, out: Array) -> None:
         for i in range(first, -1, -1):
             completed(rows[k, i], i, Z)
         if not last:
-            out[k] = explained(chain, k, m, Z, row)
+            explained(chain, k, m, Z, row, out[k], coupled[k])
+        for i in range(m + 3):
+            for j in range(2 * m + 3, n):
+                nodes[k, i, j - 2 * m - 3] = Z[i, j]
         for i in range(m):
             for j in range(m, n):
                 if j < m + 3 or j >= 2 * m + 3:

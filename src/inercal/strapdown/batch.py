@@ -8,6 +8,7 @@ carried to the next; what is left between the two is weighted by the noise gaine
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,15 @@ from inercal.strapdown.settings import Noise, StrapdownSettings
 from inercal.strapdown.start import beginning, carried_through, first_coefficients
 
 
+class Followed(NamedTuple):
+    """Content of a solution: covariance ``out`` (k, m, m) of that of each interval, and with the coefficients that of
+    intervals ``coupled`` (k, m, p) and of nodes and references of their rests ``nodes`` (k + 1, m + 3, p)."""
+
+    out: Array
+    coupled: Array
+    nodes: Array
+
+
 @short_repr
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -33,7 +43,7 @@ class Fit:
 
     ``chi2`` with ``dof`` degrees of freedom is of the data, without the prior; of each interval its part ``squares``
     (k,) and its ``redundancy`` (k,), the expected value of that; ``passes`` until it ``converged``; ``chain`` is the
-    last linear problem, ``sensitivities`` (k, 6, 51) its derivatives by all coefficients.
+    last linear problem, ``sensitivities`` (k, 6, 51) its derivatives by all coefficients, ``said`` what it says.
     """
 
     c: Array
@@ -51,6 +61,7 @@ class Fit:
     converged: bool
     chain: Chain
     sensitivities: Array
+    said: Followed
 
 
 def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
@@ -61,11 +72,19 @@ def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
 
 
 def variances_of(noise: Noise) -> Array:
-    """Variances (4,) [per s] of attitude, velocity, and the biases of gyros and accelerometers, of which one that does
-    not walk beside one that does is given so little that it does not matter."""
+    """Variances (6,): [per s] of attitude, velocity, and the biases of gyros and accelerometers, of which one that does
+    not walk beside one that does is given so little that it does not matter; of attitude and velocity over a turn."""
     white = np.array([noise.angle_random_walk, noise.velocity_random_walk])
     walks = np.array([noise.gyro_walk, noise.accelerometer_walk])
-    return np.asarray(np.square(np.concatenate([white, np.maximum(walks, 1e-5 * white)])))
+    turns = [noise.turn_attitude, noise.turn_velocity]
+    return np.asarray(np.square(np.concatenate([white, np.maximum(walks, 1e-5 * white), turns])))
+
+
+def add_turns(Q: Array, turns: NDArray[np.int64], variances: Array) -> None:
+    """Add to the covariances ``Q`` (k, m, m) of intervals what turns add to the noise of the sensors."""
+    for at, variance in ((0, variances[4]), (3, variances[5])):
+        for i in range(at, at + 3):
+            Q[turns, i, i] += variance
 
 
 def empty_shot(count: int, m: int) -> Shot:
@@ -79,17 +98,18 @@ def empty_shot(count: int, m: int) -> Shot:
     )
 
 
-def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit | None:
-    """Fit the model to a recording with nodes in its rests; None where the solution runs off to no numbers."""
+def fit(samples: Samples, nodes: Nodes, settings: StrapdownSettings, before: Fit | None = None) -> Fit | None:
+    """Fit the model to a recording with nodes in its rests, from another fit on where there was one ``before``; None
+    where the solution runs off to no numbers."""
     with np.errstate(all="ignore"):
         try:
-            found = _fitted(samples, nodes, settings)
+            found = _fitted(samples, nodes, settings, before)
         except np.linalg.LinAlgError:
             return None
     return found if np.isfinite(found.chi2) and np.isfinite(found.covariance).all() else None
 
 
-def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
+def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begun: Fit | None) -> Fit:
     """The fit; raises `numpy.linalg.LinAlgError` where a matrix is singular or no matrix of numbers."""
     noise, m = settings.noise, 12 if settings.noise.walks else 6
     variances = variances_of(noise)
@@ -98,9 +118,13 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     prior, c = deviations[free], first_coefficients(samples, nodes)
     motion = freed(samples, c)
     begin = beginning(motion, nodes, settings)
-    q = carried_through(motion, nodes, begin)
     count = len(nodes.sample)
     v, bias, shot = np.zeros((count, 3)), np.zeros((count, 6)), empty_shot(count - 1, m)
+    if begun is None:
+        q = carried_through(motion, nodes, begin)
+    else:
+        c, q, v = begun.c.copy(), begun.q_nb, begun.velocity
+        motion = freed(samples, c)
     reference = q[np.unique(nodes.rest, return_index=True)[1]][nodes.rest]
     n = 2 * m + 3 + len(free)
     H, g = np.empty((n, n)), np.empty(n)
@@ -111,6 +135,7 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     while True:
         world, by = world_of(settings, c, samples.ts), gains(c)
         shoot(motion, nodes.cuts, nodes.first, State(q, v, bias), by, world, variances, shot)
+        add_turns(shot.Q, nodes.turns, variances)
         apart = log(multiply(shot.q, conjugate(q[1:]))), shot.v - v[1:], bias[:-1] - bias[1:]
         e = np.ascontiguousarray(np.hstack(apart)[:, :m])
         # the force through an interval is known by the velocities at its ends: its noise would tell of the heading
@@ -132,14 +157,14 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
             c[free].copy(),
         )
         forward(chain, H, g, rows, right)
-        information = _information(H, len(free))
+        information = information_of(H, len(free))
         covariance = inverse(information, prior)
         step = covariance @ g[-len(free) :]
         backward(nodes.rest, rows, right, step, x, angles)
         passes += 1
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
         if size < LIMITS.step or passes >= LIMITS.iterations or not np.isfinite(size):
-            converged = size < LIMITS.step
+            converged = size < (LIMITS.step if passes < LIMITS.iterations else LIMITS.last_step)
             break
         ahead = _longer(step, before, information)
         before = step if ahead == 1.0 else None
@@ -153,7 +178,7 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
     # what the data tell of a coefficient goes from the degrees of freedom, what the prior tells does not
     dof = float(rows_more - np.sum(1.0 - np.diag(covariance) / prior**2))
     q, v = multiply(exp(x[:, :3]), q), v + x[:, 3:6]
-    redundancy = m - _followed(chain, rows, covariance)
+    said = followed_by(chain, rows, covariance)
     return Fit(
         c,
         free,
@@ -165,21 +190,24 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings) -> Fit:
         chi2,
         dof,
         squares,
-        redundancy,
+        m - np.einsum("kab,kba->k", chain.W, said.out),
         passes,
         converged,
         chain,
         shot.G,
+        said,
     )
 
 
-def _followed(chain: Chain, rows: Array, covariance: Array) -> Array:
-    """Degrees of freedom (k,) of each interval that the solution follows."""
-    n, p = rows.shape[2], len(covariance)
-    Z, out = np.zeros((n, n)), np.zeros(len(chain.rest) - 1)
+def followed_by(chain: Chain, rows: Array, covariance: Array) -> Followed:
+    """Content of the solution of a chain, with the ``rows`` of its elimination and the ``covariance`` (p, p) of the
+    coefficients."""
+    n, p, m, count = rows.shape[2], len(covariance), chain.F.shape[1], len(chain.rest)
+    Z = np.zeros((n, n))
     Z[n - p :, n - p :] = covariance
-    followed(chain, rows, Z, out)
-    return out
+    said = Followed(np.zeros((count - 1, m, m)), np.zeros((count - 1, m, p)), np.zeros((count, m + 3, p)))
+    followed(chain, rows, Z, *said)
+    return said
 
 
 def _longer(step: Array, before: Array | None, information: Array) -> float:
@@ -205,29 +233,22 @@ def _wide(G: Array, m: int) -> Array:
 def start_information(u: Array, variances: Array, m: int) -> Array:
     """Information (m,) of the state of the first node, its attitude known to ``u`` (3,) [rad], its velocity not at all;
     biases do not deviate there."""
-    held = 1e6 / np.repeat(variances[2:], 3)
+    held = 1e6 / np.repeat(variances[2:4], 3)
     return np.concatenate([u**-2, np.zeros(3), held])[:m]
 
 
-def covariance_of(chain: Chain, prior: Array) -> Array:
-    """Covariance (p, p) of the coefficients of a linear problem; ``prior`` (p,) are their sizes."""
-    m, p = chain.F.shape[1], len(prior)
-    n, count = 2 * m + 3 + p, len(chain.rest)
-    H = np.empty((n, n))
-    forward(chain, H, np.empty(n), np.empty((count, m + 3, n)), np.empty((count, m + 3)))
-    return inverse(_information(H, p), prior)
-
-
-def interval_noise(fit: Fit, samples: Samples, settings: StrapdownSettings, more: Array) -> Array:
-    """Information (k, m, m) of the intervals of a fit, the variances of sensor noise and walks times ``more`` (4,)."""
+def interval_covariance(fit: Fit, samples: Samples, settings: StrapdownSettings, variances: Array) -> Array:
+    """Covariance (k, m, m) of what sensor noise, walks and turns of ``variances`` (6,) gain over the intervals of a
+    fit: it is linear in these."""
     m, count = fit.chain.F.shape[1], len(fit.nodes.sample)
     shot, state = empty_shot(count - 1, m), State(fit.q_nb, fit.velocity, np.zeros((count, 6)))
-    variances, world = variances_of(settings.noise) * more, world_of(settings, fit.c, samples.ts)
+    world = world_of(settings, fit.c, samples.ts)
     shoot(freed(samples, fit.c), fit.nodes.cuts, fit.nodes.first, state, gains(fit.c), world, variances, shot)
-    return np.asarray(np.linalg.inv(shot.Q))
+    add_turns(shot.Q, fit.nodes.turns, variances)
+    return shot.Q
 
 
-def _information(H: Array, p: int) -> Array:
+def information_of(H: Array, p: int) -> Array:
     """Information (p, p) of the coefficients, of which the upper triangle is at the end of ``H``."""
     upper = np.triu(H[-p:, -p:])
     return np.asarray(upper + np.triu(upper, 1).T)
@@ -240,9 +261,14 @@ def inverse(information: Array, prior: Array) -> Array:
     return np.asarray(root.T @ root * np.outer(prior, prior))
 
 
+def left_over(chain: Chain, step: Array, x: Array) -> Array:
+    """Residuals (k, m) of the intervals at a solution."""
+    return np.asarray(chain.e + np.einsum("kij,kj->ki", chain.F, x[:-1]) + chain.G @ step - x[1:])
+
+
 def _chi2(chain: Chain, step: Array, x: Array, angles: Array) -> tuple[float, Array]:
     """Sum of squares of the data at the solution, and its parts (k,) by interval."""
-    left = chain.e + np.einsum("kij,kj->ki", chain.F, x[:-1]) + chain.G @ step - x[1:]
+    left = left_over(chain, step, x)
     squares = np.einsum("ki,kij,kj->k", left, chain.W, left)
     velocity = chain.velocity * np.sum((chain.v + x[:, 3:6]) ** 2)
     attitude = chain.attitude * np.sum((chain.angles + x[:, :3] - angles) ** 2)

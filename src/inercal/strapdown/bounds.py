@@ -18,7 +18,7 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.geometry.rotations import elementary, from_matrix
-from inercal.strapdown.batch import empty_shot, inverse, start_information, variances_of, world_of
+from inercal.strapdown.batch import add_turns, empty_shot, inverse, start_information, variances_of, world_of
 from inercal.strapdown.coefficients import SIZE, free_places, names, slope, stated
 from inercal.strapdown.kernels import Motion, State, increments, shoot
 from inercal.strapdown.limits import LIMITS
@@ -135,7 +135,7 @@ class Pieces:
             margin, time = self.settings.rests.margin, turn_time * abs(angle) / (0.5 * np.pi)
             count = int(np.ceil(2.0 * abs(angle) / LIMITS.block_angle))
             turn = Turn(margin, time, C, axis, angle, np.zeros(3))
-            self._kept[key] = self._interval(turn, time + 2.0 * margin, max(count, 10))
+            self._kept[key] = self._interval(turn, time + 2.0 * margin, max(count, 10), True)
         return self._kept[key]
 
     def _rest(self, C: Array, dwell: float) -> Array:
@@ -164,8 +164,9 @@ class Pieces:
             )
         return self._kept[key]
 
-    def _interval(self, turn: Turn, time: float, count: int) -> Array:
-        """Information (2 m + p, 2 m + p) of an interval of ``time`` [s] in ``count`` steps."""
+    def _interval(self, turn: Turn, time: float, count: int, turns: bool = False) -> Array:
+        """Information (2 m + p, 2 m + p) of an interval of ``time`` [s] in ``count`` steps, one that ``turns`` or
+        not."""
         settings, m, c = self.settings, self.m, np.zeros(SIZE)
         ts = time / count
         world = world_of(settings, c, ts)
@@ -176,7 +177,10 @@ class Pieces:
         state = State(from_matrix(turn.C_nb[None]), np.zeros((1, 3)), np.zeros((1, 6)))
         shot = empty_shot(1, m)
         cuts, first = np.arange(count + 1), np.array([0, count])
-        shoot(motion, cuts, first, state, gains(c), world, variances_of(settings.noise), shot)
+        variances = variances_of(settings.noise)
+        shoot(motion, cuts, first, state, gains(c), world, variances, shot)
+        if turns:
+            add_turns(shot.Q, np.zeros(1, dtype=np.int64), variances)
         G = np.zeros((m, len(self.free)))
         G[:6] = shot.G[0][:, self.free] * self.prior
         rows = np.hstack([-shot.F[0], np.eye(m), -G])

@@ -65,6 +65,31 @@ class Limits:
     iterations: int = 30
     """Steps at most."""
 
+    last_step: float = 0.2
+    """Largest step, over the standard uncertainties, of the last of these at which the fit still counts: with a model
+    that lacks much, steps end in a small wandering."""
+
+    scoring: int = 60
+    """Steps at most to the noise that a record shows, of one linear problem."""
+
+    scoring_gain: float = 1e-3
+    """Fall of -2 ln L in a step, below which they end."""
+
+    noise_rounds: int = 6
+    """Fits at most while noise is estimated."""
+
+    noise_step: float = 0.1
+    """Relative change of a variance between them, below which they end."""
+
+    walk_start: float = 30.0
+    """Time [s] in which a walk that is estimated begins as large as white noise."""
+
+    turn_excess: float = 1.5
+    """Residuals over turns, rms over the noise, from which on the noise of turns is estimated."""
+
+    wildest_turn: float = math.radians(15.0)
+    """Attitude [rad] by which turns may fail to close: beyond, signs or units are wrong."""
+
     risk: float = 1e-4
     """Probability by chance of the largest chi-square that still agrees with the model."""
 

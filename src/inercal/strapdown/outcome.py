@@ -24,8 +24,9 @@ from inercal.strapdown.budget import sources
 from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
 from inercal.strapdown.left_out import Tested, tests
 from inercal.strapdown.limits import LIMITS
+from inercal.strapdown.restricted import residuals
 from inercal.strapdown.samples import Samples, freed
-from inercal.strapdown.settings import StrapdownSettings
+from inercal.strapdown.settings import TURN_NOISE, StrapdownSettings
 
 COMMAND = "calibrate strapdown"
 
@@ -94,15 +95,15 @@ def assemble(
     tested = tests(fit, settings)
     findings += _left_out(tested, found, J, uncertainty.u)
     findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
-    turns, still = fit.nodes.turns, np.ones(len(fit.squares), dtype=bool)
-    still[turns] = False
+    findings += _turn_noise(settings, left)
+    at_rest, over_turns = residuals(fit)
     statistics = {
         "dof": float(fit.dof),
         "chi2": fit.chi2,
         "condition": judged.condition,
         "residual_rms": math.sqrt(fit.chi2 / fit.dof),
-        "rest_residual_rms": math.sqrt(fit.squares[still].sum() / fit.redundancy[still].sum()),
-        "turn_residual_rms": math.sqrt(fit.squares[turns].sum() / fit.redundancy[turns].sum()),
+        "rest_residual_rms": at_rest,
+        "turn_residual_rms": over_turns,
         "intervals": float(len(rests)),
     }
     return Estimate.of(
@@ -124,6 +125,11 @@ def assemble(
             "bounds": dict(zip(found, by_fit.tolist(), strict=True)),
             "at_prior": at_prior,
             "nuisances": _nuisances(fit),
+            "turn_noise": {
+                "attitude": settings.noise.turn_attitude,
+                "velocity": settings.noise.turn_velocity,
+            },
+            "walks": {"gyro": settings.noise.gyro_walk, "accelerometer": settings.noise.accelerometer_walk},
             "left_out": {
                 each.candidate.name: {"chi2_drop": each.drop, "parameters": len(each.candidate.prior)}
                 for each in tested
@@ -229,6 +235,24 @@ def _too_quiet(fit: Fit) -> list[Finding]:
         "every u with it"
     )
     return [Finding("low_scatter", text)]
+
+
+def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[Finding]:
+    """``turn_noise`` where the noise of turns was found from the recording; it names places and delay that it hides."""
+    noise, given = settings.noise, settings.given.get("noise", {})
+    if not (noise.turn_velocity or noise.turn_attitude) or any(
+        given.get(name, "estimate") != "estimate" for name in TURN_NOISE
+    ):
+        return []
+    text = (
+        f"turns close less well than white noise says, by {100.0 * noise.turn_velocity:.2g} cm/s and "
+        f"{math.degrees(noise.turn_attitude):.2g} deg each, which u allows for: look for a range that was exceeded, "
+        "filters of the unit, lost samples, stamps that were made up"
+    )
+    hidden = [name for name in left if group_of(name) in ("size", "delay") and left[name] > HALF_SEEN]
+    if hidden:
+        text += f"; {counted_names(hidden, 6)} cannot be told beside it and stay at their prior"
+    return [Finding("turn_noise", text)]
 
 
 def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:

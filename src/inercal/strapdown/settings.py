@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -32,11 +32,17 @@ Term = Literal["k2", "size", "delay", "asymmetry", "g_sensitivity"]
 _MARGIN = within(0.0, math.inf, "a time of 0 or more")
 _NODE = Bounds(lambda time: 0.1 <= time <= 100.0, "a time from 0.1 s to 100 s")
 _WALK = within(0.0, math.inf, "a walk of 0 or more")
+_CLOSURE = within(0.0, math.inf, "a standard deviation of 0 or more")
+
+TURN_NOISE: Final[tuple[str, ...]] = ("turn_attitude", "turn_velocity")
+WALKS: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
+ESTIMABLE: Final = (*WALKS, *TURN_NOISE)
+"""Fields of `Noise` that a recording can tell."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of the sensors."""
+    """Noise of the sensors, and of turns; what is in ``estimate`` is found from the recording."""
 
     angle_random_walk: float = quantity(
         "of the gyros", "angle random walk", REQUIRED, example="5e-4 deg/sqrt(h)",
@@ -54,6 +60,14 @@ class Noise:
         "random walk of the accelerometers' biases", "acceleration random walk", "0 ug/sqrt(s)",
         example="2 ug/sqrt(s)", bounds=_WALK,
     )  # fmt: skip
+    turn_attitude: float = quantity(
+        "by which the attitude does not close over a turn, beyond the noise of the sensors", "angle", 0.0,
+        example="0.02 deg", bounds=_CLOSURE,
+    )  # fmt: skip
+    turn_velocity: float = quantity(
+        "the same of the velocity", "velocity", 0.0, example="1 cm/s", bounds=_CLOSURE
+    )
+    estimate: tuple[str, ...] = TURN_NOISE
 
     @property
     def walks(self) -> bool:

@@ -171,6 +171,9 @@ def simulated(settings: StrapdownSettings, c: Array, rng: np.random.Generator, n
     if noise:
         sway, shake = _disturbed(mean, settings, c[R].reshape(3, 3), rng, ts)
         white, walk = _sensor_noise(settings.noise, count, rng, ts)
+        if settings.noise.turn_attitude or settings.noise.turn_velocity:
+            ends = [round((each.begin + each.time) / ts) for each in turns]
+            _add_turn_noise(settings.noise, ends, mean.C_nb, rng, (rate, force), ts)
         rate, force = rate + sway + white[0] + walk[0], force + shake + white[1] + walk[1]
     return Samples(rate, force, ts)
 
@@ -183,6 +186,21 @@ def _sensor_noise(
     white = [rng.standard_normal((count, 3)) * density / np.sqrt(ts) for density in densities]
     walks = noise.gyro_walk, noise.accelerometer_walk
     return white, [np.cumsum(rng.standard_normal((count, 3)) * walk * np.sqrt(ts), axis=0) for walk in walks]
+
+
+def _add_turn_noise(
+    noise: Noise,
+    ends: list[int],
+    C_nb: Array,
+    rng: np.random.Generator,
+    outputs: tuple[Array, Array],
+    ts: float,
+) -> None:
+    """Add to rates and forces (n, 3) what attitude and velocity do not close by, in the sample where each turn
+    ends."""
+    for output, size in zip(outputs, (noise.turn_attitude, noise.turn_velocity), strict=True):
+        jumps = size * rng.standard_normal((len(ends), 3)) / ts
+        output[ends] += np.einsum("nji,nj->ni", C_nb[ends], jumps)
 
 
 def _disturbed(

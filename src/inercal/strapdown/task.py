@@ -16,6 +16,7 @@ from inercal.strapdown.batch import Fit, fit
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.outcome import assemble, too_few, useless
 from inercal.strapdown.reading import samples_of
+from inercal.strapdown.restricted import with_noise_shown
 from inercal.strapdown.rests import found_rests, mean_force, nodes_of
 from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import StrapdownSettings
@@ -65,10 +66,13 @@ def calibrate(
     progress("fitting")
     force = mean_force(samples, rests)
     plausible = abs(force / settings.site.gravity - 1.0) < LIMITS.off_gravity
-    fitted = fit(samples, nodes_of(samples, rests, settings.rests.node), settings) if plausible else None
+    nodes = nodes_of(samples, rests, settings.rests.node)
+    fitted = fit(samples, nodes, settings) if plausible else None
     if fitted is None:
         estimate = useless(record, samples, rests, settings, force)
         return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
+    progress("estimating noise")
+    settings, fitted = with_noise_shown(samples, nodes, settings, fitted)
     progress("assembling")
     estimate = assemble(record, samples, rests, fitted, settings)
     return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)

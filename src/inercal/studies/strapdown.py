@@ -15,6 +15,8 @@ from inercal._toml import Strict, check
 from inercal.errors import StudyError
 from inercal.strapdown.coefficients import OPTIONS, names
 from inercal.strapdown.settings import (
+    ESTIMABLE,
+    TURN_NOISE,
     Design,
     Goal,
     Motion,
@@ -138,6 +140,40 @@ class StartTable(Strict):
     )
 
 
+def _size(dimension: str, example: str) -> QuantityText:
+    """The reading of a noise that a recording can tell."""
+    return QuantityText(dimension, example, lambda size: size >= 0.0, "0 or more, or estimate")
+
+
+def _estimable(says: str, example: str, default: str) -> Any:
+    """The field of such a noise."""
+    return Field(
+        default=None,
+        examples=[example],
+        description=f"{says}; estimate finds it from the recording",
+        json_schema_extra={"default": default},
+    )
+
+
+class NoiseTable(table_of(Noise)):  # type: ignore[misc]
+    """Noise of the sensors, and of turns."""
+
+    gyro_walk: (
+        Literal["estimate"] | Annotated[Quantity, _size("rate random walk", "0.4 deg/h/sqrt(s)")] | None
+    ) = _estimable("random walk of the gyros' biases", "0.4 deg/h/sqrt(s)", "0 deg/h/sqrt(s)")
+    accelerometer_walk: (
+        Literal["estimate"] | Annotated[Quantity, _size("acceleration random walk", "2 ug/sqrt(s)")] | None
+    ) = _estimable("random walk of the accelerometers' biases", "2 ug/sqrt(s)", "0 ug/sqrt(s)")
+    turn_attitude: Literal["estimate"] | Annotated[Quantity, _size("angle", "0.02 deg")] | None = _estimable(
+        "standard deviation by which the attitude does not close over a turn, beyond the noise of the sensors",
+        "0.02 deg",
+        "estimate",
+    )
+    turn_velocity: Literal["estimate"] | Annotated[Quantity, _size("velocity", "1 cm/s")] | None = _estimable(
+        "the same of the velocity", "1 cm/s", "estimate"
+    )
+
+
 class RestsTable(table_of(Rests)):  # type: ignore[misc]
     """Rests of the unit between its turns."""
 
@@ -182,7 +218,7 @@ class StrapdownStudyFile(Strict):
     version: Version = 1
     site: SiteTable = Field(default=SiteTable(), title="Site", description="where the unit stands")
     strapdown: StrapdownTable = Field(title="Strapdown", description="what to calibrate")
-    noise: Stated[Noise] = Field(title="Noise", description="noise of the sensors")
+    noise: NoiseTable = Field(title="Noise", description="noise of the sensors, and of turns")
     rests: RestsTable = Field(default=RestsTable(), title="Rests", description="rests between the turns")
     start: StartTable = Field(default=StartTable(), title="Start", description="attitude at the first rest")
     prior: Stated[Prior] = Field(default=Prior(), title="Prior", description="what is known before the test")
@@ -225,7 +261,7 @@ def strapdown_study(data: Mapping[str, Any], path: str | Path) -> StrapdownSetti
         StrapdownSettings,
         file.strapdown,
         site=site,
-        noise=file.noise,
+        noise=_noise(file.noise),
         terms=tuple(dict.fromkeys(file.strapdown.terms)),
         rests=settings_of(
             Rests,
@@ -256,6 +292,16 @@ def _truth(file: StrapdownStudyFile, gravity: float, path: str | Path) -> dict[s
         unit = parse_unit("m/s^2" if kind == "accelerometer" else "rad/s")
         truth[symbol], _ = coefficient_of(text, symbol, kind, unit, gravity, key, path)
     return truth
+
+
+def _noise(table: Any) -> Noise:
+    """Noise that is stated, and the names of that which is to be found from the recording."""
+    usual = {name: "estimate" if name in TURN_NOISE else None for name in ESTIMABLE}
+    typed = {name: getattr(table, name) or default for name, default in usual.items()}
+    sizes = {name: each.value if isinstance(each, Quantity) else 0.0 for name, each in typed.items()}
+    return settings_of(
+        Noise, table, **sizes, estimate=tuple(name for name, each in typed.items() if each == "estimate")
+    )
 
 
 def _start(table: StartTable) -> Start:

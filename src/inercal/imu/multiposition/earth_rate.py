@@ -15,7 +15,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.site import Site
-from inercal.imu.turns import Turns, attitudes, increments
+from inercal.imu.turns import Turns, increments, whole_turns
 from inercal.instruments.triad import TriadModel
 
 
@@ -90,7 +90,7 @@ def unknown_rates(
     A rate h fixed to the Earth adds ``-h dt`` to every rotation vector, in the frame of the turn's start
     ``-h tau`` in all, and so moves the carried vertical by ``-tau R^T (n x h)``.
     """
-    R = attitudes(increments(turns, model, drift))[-1]
+    R = whole_turns(increments(turns, model, drift))
     runs = [k for k in range(len(turns)) if k == 0 or turns.first[k] != turns.last[k - 1]]
     q = 1 + 2 * len(runs)
     at_rest, in_turns = np.zeros((len(verticals), 3, q)), np.zeros((len(turns), 3, q))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
+from inercal.geometry.kernels import Vector
 from inercal.selfcal.filters.gaps import anew, walking
 from inercal.selfcal.filters.problem import (
     FilterModel,
@@ -34,6 +35,7 @@ from inercal.selfcal.platform.linearised import (
     WIDEST,
     Step,
     accelerometer_row,
+    decorrelated_row,
     empty_columns,
     encoder_columns,
     encoder_roots,
@@ -232,9 +234,11 @@ def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -
             for i in range(m):
                 gain[i] = own[i] / inner
         for i in range(m):
-            for k in range(i + 1):
-                P[s, i, k] += gain[i] * inner * gain[k] - gain[i] * own[k] - own[i] * gain[k]
-                P[s, k, i] = P[s, i, k]
+            own[i] -= 0.5 * inner * gain[i]
+        for i in range(m):
+            by_gain, by_own = gain[i], own[i]
+            for k in range(m):
+                P[s, i, k] -= by_gain * own[k] + by_own * gain[k]  # symmetric to the last digit
 
 
 class Path(NamedTuple):
@@ -251,13 +255,26 @@ class Path(NamedTuple):
 
 
 @kernel
+def arrived(path: Path, k: int, c: Array, earth: Vector, up: Vector) -> tuple[Step, Rates]:
+    """The step to row ``k`` of a path, and the rates there; ``earth`` and ``up`` are those of the encoders' frame."""
+    q, w, dt, warm = path.q[k], path.rate, path.dt[k - 1], path.warm[k]
+    at, following = (q[0], q[1], q[2], q[3]), min(k, len(w) - 1)
+    commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
+    read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
+    rate, force = platform_rate(commanded, c), force_within(at, commanded, -0.5 * dt, up)
+    if len(c) > 24:
+        rate = drifting(rate, force, warm, c)
+    return Step(commanded, rate, earth, at, dt, force, warm), read
+
+
+@kernel
 def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 
     ``P`` (1 or 1 + sources, 3 + p, 3 + p) is that at the first row, the whole and then its parts; ``c`` is the
     full vector, linear form; ``u`` (n or 0, p) receives standard uncertainties.
     """
-    q, th, dt, w, seen, warm = path
+    q, th, seen, warm = path.q, path.th, path.measured, path.warm
     world, noise, gate, layout = model
     m, place = P.shape[1], layout.place
     top, work, row, columns = np.empty((3, m)), np.empty((2, m)), empty_row(WIDEST), empty_columns()
@@ -265,15 +282,9 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
     earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
-        at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
         if k > 0:
-            following = min(k, len(w) - 1)
-            commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
-            read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-            rate, f = platform_rate(commanded, c), force_within(at, commanded, -0.5 * dt[k - 1], up_e)
-            if len(c) > 24:
-                rate = drifting(rate, f, warm[k], c)
-            step = Step(commanded, rate, earth_e, at, dt[k - 1], f, warm[k])
+            step, read = arrived(path, k, c, earth_e, up_e)
+            at = step.attitude
             walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
             for s in range(len(P)):
                 propagate_covariance(P[s], c, place, step, walk if s < 2 else 0.0, top, columns)
@@ -290,14 +301,8 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                         th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                     )
                     for i in range(3):
-                        root = roots[i]
-                        for j in range(i + 1):
-                            row.places[j], row.values[j] = j, root[j]
-                        for a in range(wide):
-                            x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
-                            row.places[1 + i + a] = columns.places[a]
-                            row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
-                        observe(P, row, i + 1 + wide, 1.0, _PARTS[1], work)
+                        size = decorrelated_row(i, roots[i], columns, wide, row)
+                        observe(P, row, size, 1.0, _PARTS[1], work)
                 sensed = sensing(at, read, earth_e, up_e, warm[k], c)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):

@@ -12,7 +12,7 @@ Processes and Filtering Theory, 1970, section 8.4). G and D are the columns that
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from inercal._jit import kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import exp, right_jacobian, rotate
-from inercal.selfcal.before.bounds import Path
+from inercal.selfcal.before.bounds import Path, arrived
 from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, admitted, encoders_at, updating, watch
 from inercal.selfcal.platform.kinematics import attitude
@@ -32,19 +32,17 @@ from inercal.selfcal.platform.linearised import (
     Places,
     Step,
     accelerometer_row,
+    decorrelated_row,
     dynamics_columns,
     empty_columns,
     encoder_columns,
     encoder_roots,
+    encoder_row,
     propagate_covariance,
     wander,
 )
 from inercal.selfcal.platform.model import (
-    Rates,
-    drifting,
-    force_within,
     on_the_base,
-    platform_rate,
     sensing,
     specific_force,
 )
@@ -64,11 +62,9 @@ def sensitivities(
 
     ``attitudes`` (n, 4), ``coefficients`` and ``restarts`` as of `inercal.selfcal.before.bounds.recorded_bounds`.
     """
-    return -_carried(recording, problem, attitudes, coefficients, names, restarts)[3:]
-
-
-_CHUNK = 1 << 14
-"""Rows whose innovations are changed at once."""
+    return -_carried(
+        recording, problem, attitudes, coefficients, names, restarts, np.empty((0, 6, len(names)))
+    )[3:]
 
 
 def innovation_slopes(
@@ -78,12 +74,12 @@ def innovation_slopes(
     coefficients: Array,
     names: Sequence[str],
     restarts: Sequence[int],
-    take: Callable[[int, Array], None],
-) -> None:
-    """Changes (k, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities` has
-    those of the estimates; 0 where nothing was measured. ``take`` is given the first step and the changes of k steps at
-    a time, in the order of the recording; their array is used again."""
-    _carried(recording, problem, attitudes, coefficients, names, restarts, take)
+) -> Array:
+    """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities`
+    has those of the estimates; 0 where nothing was measured."""
+    slopes = np.zeros((len(recording.t), 6, len(names)))
+    _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
+    return slopes[1:]
 
 
 def _carried(
@@ -93,9 +89,10 @@ def _carried(
     coefficients: Array,
     names: Sequence[str],
     restarts: Sequence[int],
-    take: Callable[[int, Array], None] | None = None,
+    slopes: Array,
 ) -> Array:
-    """Sensitivities (3 + p, m) of the errors of attitude and states at the end; ``take`` as of `innovation_slopes`."""
+    """Sensitivities (3 + p, m) of the errors of attitude and states at the end; ``slopes`` (n or 0, 6, m), zeros, as of
+    `carry`."""
     p, m = len(coefficients), len(names)
     states = problem.states
     place = np.full(len(ALL), -1, dtype=np.int64)
@@ -109,22 +106,13 @@ def _carried(
     seen = np.column_stack([np.isfinite(recording.acc), np.all(np.isfinite(recording.th), axis=1)])
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     warm = np.zeros(len(q)) if recording.warm is None else recording.warm
-    first, room = 0, np.zeros((_CHUNK if take else 0, 6, m))
+    first = 0
     model = problem.model._replace(layout=Layout(states.index, place, full, whole.layout.waves))
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
-        begin = first
-        while True:  # a part begins with the last row of the one before
-            end = min(begin + len(room), last) if take else last
-            rows, steps = slice(begin, end), slice(begin, end if end < last else max(end - 1, 0))
-            path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
-            room[: end - begin] = 0.0
-            carry(P, S, path, full, model, room[: end - begin])
-            if take:
-                take(begin, room[1 : end - begin])
-            if end == last:
-                break
-            begin = end - 1
+        rows, steps = slice(first, last), slice(first, max(last - 1, 0))
+        path = Path(q[rows], th[rows], dt[steps], rate[steps], seen[rows], warm[rows])
+        carry(P, S, path, full, model, slopes[rows])
         if last < len(q):
             P[:3], P[:, :3], S[:3] = 0.0, 0.0, 0.0
             P[np.diag_indices(3)] = anew(problem, th[last]).sigma ** 2
@@ -151,7 +139,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
     """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
     whole full vector, linear form; in the layout considered states have the places behind the n. ``slopes`` (rows, 6,
     m), or none, receive those of the normalised innovations."""
-    q, th, dt, w, seen, warm = path
+    q, th, measured, warm = path.q, path.th, path.measured, path.warm
     world, noise, gate, layout = model
     n, place = len(P), layout.place
     own = place.copy()
@@ -163,48 +151,36 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
     earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(1, len(q)):
-        at, following = (q[k, 0], q[k, 1], q[k, 2], q[k, 3]), min(k, len(w) - 1)
-        commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
-        read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-        force = force_within(at, commanded, -0.5 * dt[k - 1], up_e)
-        rate = drifting(platform_rate(commanded, c), force, warm[k], c)
-        step = Step(commanded, rate, earth_e, at, dt[k - 1], force, warm[k])
+        step, read = arrived(path, k, c, earth_e, up_e)
+        at = step.attitude
         _carry_step(S, n, c, place, step, shift, columns)
         walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
         propagate_covariance(P, c, own, step, walk, top, columns)
         wander(P, mean, own, noise.gyro_walk, noise.accelerometer_walk, step.dt)
         forget(S, own, step.dt)
-        if seen[k, 3]:
+        if measured[k, 3]:
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
-            if seen[k, 3]:
+            if measured[k, 3]:
                 roots, variances = encoder_roots(th[k], world.axes, world.signs, noise.encoder)
                 wide = encoder_columns(
                     th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
                 )
                 for i in range(3 if len(slopes) > 0 else 0):
-                    row.places[0], row.values[0] = i, 1.0
-                    for a in range(wide):
-                        row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
-                    _shown(P, S, row, 1 + wide, variances[i], slopes[k, 3 + i])
+                    size = encoder_row(i, columns, wide, row)
+                    _shown(P, S, row, size, variances[i], slopes[k, 3 + i])
                 for i in range(3):
-                    root = roots[i]
-                    for j in range(i + 1):
-                        row.places[j], row.values[j] = j, root[j]
-                    for a in range(wide):
-                        x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
-                        row.places[1 + i + a] = columns.places[a]
-                        row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
-                    _update(P, S, row, i + 1 + wide, 1.0, gain)
+                    size = decorrelated_row(i, roots[i], columns, wide, row)
+                    _update(P, S, row, size, 1.0, gain, shift[0])
             sensed = sensing(at, read, earth_e, up_e, warm[k], c)
             for i in range(3 if len(slopes) > 0 else 0):
-                if seen[k, i] and admitted(i, gate, near):
+                if measured[k, i] and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
                     _shown(P, S, row, size, variance, slopes[k, i])
             for i in range(3):
-                if seen[k, i] and admitted(i, gate, near):
+                if measured[k, i] and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
-                    _update(P, S, row, size, variance, gain)
+                    _update(P, S, row, size, variance, gain, shift[0])
 
 
 @kernel
@@ -254,19 +230,29 @@ def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> N
         for b in range(size):
             if places[a] < n and places[b] < n:
                 total += values[a] * values[b] * P[places[a], places[b]]
+    _seen(S, row, size, n, slope)
+    root = math.sqrt(total) if total > 0.0 else math.nan
     for k in range(len(slope)):
-        seen = 0.0
-        for a in range(size):
-            if places[a] < n:
-                seen += values[a] * S[places[a], k]
-            elif places[a] == n + k:
-                seen += values[a]
-        slope[k] = seen / math.sqrt(total) if total > 0.0 else math.nan
+        slope[k] /= root
 
 
 @kernel
-def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array) -> None:
-    """Covariance and sensitivities after a scalar measurement of variance ``r``; ``gain`` (n,) is used up."""
+def _seen(S: Array, row: Row, size: int, n: int, out: Array) -> None:
+    """Put into ``out`` (m,) what a ``row`` sees of each error: ``S`` (n, m) of the error state, and of itself."""
+    out[:] = 0.0
+    for a in range(size):
+        at, value = row.places[a], row.values[a]
+        if at < n:
+            for k in range(len(out)):
+                out[k] += value * S[at, k]
+        else:
+            out[at - n] += value
+
+
+@kernel
+def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array, shift: Array) -> None:
+    """Covariance and sensitivities after a scalar measurement of variance ``r``; ``gain`` (n,) and ``shift`` (m,) are
+    used up."""
     places, values = row.places, row.values
     n, m = S.shape
     variance = r
@@ -278,16 +264,10 @@ def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array) -> N
     for a in range(size):
         if places[a] < n:
             variance += values[a] * gain[places[a]]
-    for k in range(m):
-        seen = 0.0
-        for a in range(size):
-            if places[a] < n:
-                seen += values[a] * S[places[a], k]
-            elif places[a] == n + k:
-                seen += values[a]
-        for i in range(n):
-            S[i, k] -= gain[i] * seen / variance
+    _seen(S, row, size, n, shift)
     for i in range(n):
         of_row = gain[i] / variance
+        for k in range(m):
+            S[i, k] -= of_row * shift[k]
         for j in range(n):
             P[i, j] -= of_row * gain[j]

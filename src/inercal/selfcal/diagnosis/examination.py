@@ -18,10 +18,18 @@ from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.rounding import rounded
 from inercal.findings import EVERYTHING, Finding
 from inercal.instruments.terms import shown_unit
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, sound, sum_of_squares, white
+from inercal.selfcal.diagnosis.fit_quality import (
+    JUDGE,
+    Case,
+    filtered,
+    forget,
+    once,
+    sound,
+    sum_of_squares,
+    white,
+)
 from inercal.selfcal.diagnosis.gross import reordered_accelerometers
-from inercal.selfcal.diagnosis.needed_states import needed_states
-from inercal.selfcal.diagnosis.noise_check import misstated, restless_gyros
+from inercal.selfcal.diagnosis.noise_check import misstated, unsteady
 from inercal.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.selfcal.diagnosis.small import Stated, likely, small_errors
@@ -45,7 +53,20 @@ def diagnose(
     """
     if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []
-    repaired, fair, findings = _without_faults(recording, problem, systematic)
+    try:
+        return _diagnosed(recording, problem, result, systematic)
+    finally:
+        forget()
+
+
+def _diagnosed(
+    recording: Recording, problem: FilterProblem, result: FilterResult, systematic: Stated
+) -> list[Finding]:
+    """`diagnose` of a recording whose reading found it sound."""
+    if systematic is None and result.kind == "error-state" and sound(result):
+        repaired, fair, findings = recording, _fair(problem, problem, result), list[Finding]()
+    else:
+        repaired, fair, findings = _without_faults(recording, problem, systematic)
     if not findings or not sound(filtered((repaired, fair))):
         findings += _remaining((repaired, problem), fair, systematic)
     if findings or sound(result):
@@ -59,6 +80,7 @@ def diagnose(
     return findings
 
 
+@once
 def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) -> FilterProblem:
     """The problem as it may be meant: systematic inputs ``moved`` to where the recording fits best, and priors widened
     that the coefficients of the filter then contradict."""
@@ -69,24 +91,32 @@ def _fair(problem: FilterProblem, moved: FilterProblem, result: FilterResult) ->
     # values are distributed about their mean with this variance where the prior holds
     spread = np.sqrt(np.maximum(prior**2 - u**2, 0.0))
     far = (u < UNSEEN * prior) & ~(size < sigmas(LIMITS.risk, len(prior)) * spread)
+    if not far.any():
+        return moved
     return replace(
         moved,
         prior=np.where(far, LIMITS.widened_prior * np.maximum(size, prior), prior),
     )
 
 
+@once
+def _widened(problem: FilterProblem, fair: FilterProblem) -> FilterProblem:
+    """The problem with the priors of another, itself where it has them."""
+    return problem if fair.prior is problem.prior else replace(problem, prior=fair.prior)
+
+
 def _remaining(case: Case, meant: FilterProblem, systematic: Stated) -> list[Finding]:
     """Errors that the model leaves out, priors that are too narrow, and misstated noise; ``meant`` as of `_fair`."""
     recording, problem = case
     fair = (recording, meant)
-    errors, corrected = small_errors((recording, replace(problem, prior=meant.prior)), systematic)
+    errors, corrected = small_errors((recording, _widened(problem, meant)), systematic)
     now = filtered(corrected)
     # what is no constant error looks like many, none of which makes innovations white, or like biases that wander
     unexplained = bool(errors) and not white(corrected, now)
-    if unexplained or any(each.hypothesis.name in WANDERING.values() for each in errors):
-        walk = restless_gyros(fair) or (needed_states(fair) if unexplained else None)
-        if walk is not None:
-            return [walk]
+    wandering = any(each.hypothesis.name in WANDERING.values() for each in errors)
+    walk = unsteady(fair, unexplained) if unexplained or wandering else None
+    if walk is not None:
+        return [walk]
     rest = misstated(corrected, now)
     if errors and any(finding.code == "contradiction" for finding in rest):
         return misstated(fair, filtered(fair))  # errors that leave a contradiction are none
@@ -133,9 +163,7 @@ def _without_faults(
             single = likeliest(case, single_readings(case, now), JUDGE, LIMITS.risk)
             if single is not None and sound(after := filtered(single.case)):
                 best, then = single, after
-            elif sound(
-                filtered(small_errors((recording, replace(problem, prior=fair.prior)), systematic)[1])
-            ):
+            elif sound(filtered(small_errors((recording, _widened(problem, fair)), systematic)[1])):
                 break
         # what explains less than half is not what happened
         if best is None or not sum_of_squares(then) < LIMITS.explained_ratio * before:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.consistency import nis, surprising, whiteness
+from inercal.selfcal.filters.averaged import averaged, block
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.run import estimate
@@ -23,8 +27,8 @@ class ErrorState:
     """The error-state filter as a judge: its innovations and the sum of NIS."""
 
     def residuals(self, case: Case) -> Array:
-        """(k, 6) normalised innovations: of each step, or of a long recording sums of so many that k steps are left."""
-        return summed(case[0], filtered(case))
+        """(n - 1, 6) normalised innovations."""
+        return regular(case[0], filtered(case))
 
     def misfit(self, case: Case) -> float:
         """Sum of the normalised innovations squared."""
@@ -34,9 +38,33 @@ class ErrorState:
 JUDGE = ErrorState()
 
 
+Made = TypeVar("Made")
+_KEPT = list[Callable[[], None]]()
+
+
+def once(function: Callable[..., Made]) -> Callable[..., Made]:
+    """A function whose last results, of one and the same arguments, are kept until `forget`."""
+    kept = functools.lru_cache(maxsize=3)(function)
+    _KEPT.append(kept.cache_clear)
+    return kept
+
+
+def forget() -> None:
+    """Keep no results any longer."""
+    for clear in _KEPT:
+        clear()
+
+
+@once
 def filtered(case: Case) -> FilterResult:
     """Result of the error-state filter for a case."""
     return estimate(*case, "error-state", brief=True)
+
+
+@once
+def short(case: Case) -> Case:
+    """A case of no more rows than small errors are sought in: a long recording by means over blocks of rows."""
+    return averaged(*case, filtered(case)) if block(case[0]) > 1 else case
 
 
 def regular(recording: Recording, result: FilterResult) -> Array:
@@ -44,53 +72,6 @@ def regular(recording: Recording, result: FilterResult) -> Array:
     innovations = result.innovations.copy()
     innovations[near_lock(recording)] = np.nan
     return innovations
-
-
-def together(recording: Recording) -> int:
-    """Number of steps that are judged together."""
-    return -(-len(recording.t) // LIMITS.judged_rows)
-
-
-def summed(recording: Recording, result: FilterResult) -> Array:
-    """Normalised innovations (k, 6) of steps that are judged together, NaN where there are none but near gimbal lock:
-    sums of m of them, over the root of m, are as normal and as independent as they are."""
-    innovations, size = regular(recording, result), together(recording)
-    if size == 1:
-        return innovations
-    starts, used = np.arange(0, len(innovations), size), np.isfinite(innovations)
-    total = np.add.reduceat(np.where(used, innovations, 0.0), starts)
-    count = np.add.reduceat(used, starts, dtype=np.int64)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(count > 0, total / np.sqrt(count), np.nan))
-
-
-class Sums:
-    """Columns (k, 6, m) by the steps that are judged together, put together part by part; as `summed` has them."""
-
-    def __init__(self, recording: Recording, result: FilterResult, m: int) -> None:
-        self._size = together(recording)
-        self._used = np.isfinite(regular(recording, result))
-        self.columns = np.zeros((-(-len(self._used) // self._size), 6, m))
-
-    def take(self, first: int, columns: Array) -> None:
-        """Put in those (j, 6, m) of the steps from ``first`` on."""
-        if not len(columns):
-            return
-        used = self._used[first : first + len(columns)]
-        if self._size == 1:
-            self.columns[first : first + len(columns)] = np.where(used[:, :, None], columns, np.nan)
-            return
-        of = np.arange(first, first + len(columns)) // self._size
-        starts = np.flatnonzero(np.diff(of, prepend=-1))
-        self.columns[of[starts]] += np.add.reduceat(np.where(used[:, :, None], columns, 0.0), starts)
-
-    def whole(self) -> Array:
-        """All of them; NaN where no step counts. Their room is used up."""
-        if self._size > 1:
-            count = np.add.reduceat(self._used, np.arange(0, len(self._used), self._size), dtype=np.int64)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                self.columns /= np.sqrt(np.where(count > 0, count, np.nan))[:, :, None]
-        return self.columns
 
 
 def near_lock(recording: Recording) -> NDArray[np.bool_]:

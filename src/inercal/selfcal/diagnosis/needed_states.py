@@ -1,21 +1,25 @@
 """States without which a recording contradicts the model: what explains the innovations that no constant error does.
 
 With delays and levers among the states rows count less in which the rate changes; with biases that walk they follow the
-sensors. Each addition is tried by the error-state filter, and named if it leaves innovations that are nearly white.
+sensors. Each addition is tried by the error-state filter. The first that leaves innovations white is named, else that
+which leaves them whitest; 1/f noise, which is no walk to the letter, by the walk that takes most of them away.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from inercal.estimate.consistency import whiteness
 from inercal.findings import EVERYTHING, Finding
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, sound
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
+from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, RIG, STATES
 from inercal.selfcal.settings import Noise
 from inercal.units import parse_quantity
@@ -33,29 +37,70 @@ _TRIED: Final[tuple[tuple[tuple[str, ...], str, str], ...]] = (
     ((*RIG, "k2", "levers", *BIAS_WALK), _TOGETHER, '"rig", "k2", "levers", "bias_walk"'),
 )
 
-_FACTORS: Final = (1.0, 2.0, 4.0, 8.0)
+_FACTORS: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Of the walks that are stated."""
 
 
-def needed_states(case: Case) -> Finding | None:
-    """The first addition to the states that leaves innovations nearly white, if any."""
-    recording, problem = case
+class Explained(NamedTuple):
+    """An explanation of innovations: the ``finding``, and how ``white`` it leaves them, the probability by chance of
+    their correlations."""
+
+    finding: Finding
+    white: float
+
+
+@once
+def needed_states(case: Case) -> Explained | None:
+    """The addition to the states that leaves innovations white, or most nearly so, if any does."""
+    recording, problem = short(case)
+    first = filtered((recording, problem))
+    best, most, much = None, None, LIMITS.left_over * _off(recording, first) * _throughout(recording, first)
     for kinds, words, named in _TRIED:
-        walking = bool({*BIAS_WALK} & {*kinds})
-        for factor in _FACTORS if walking else (1.0,):
+        walks, before = {*kinds} <= {*BIAS_WALK}, math.inf
+        for factor in _FACTORS if {*BIAS_WALK} & {*kinds} else (1.0,):
             wider = _with_states(problem, kinds, factor)
-            if len(wider.names) > len(problem.names) and _nearly_white((recording, wider)):
-                text = f"{words} explain the innovations: name {named} in states under [model]"
-                if factor > 1.0:
-                    text += f", with {factor:g} times accelerometer_walk and gyro_walk under [noise]"
-                return Finding("unmodelled", text, harm=EVERYTHING)
-    return None
+            if len(wider.names) == len(problem.names):
+                continue
+            now = filtered((recording, wider))
+            white = whiteness(regular(recording, now)) if sound(now) else 0.0
+            advice = f"name {named} in states under [model]"
+            if factor > 1.0:
+                advice += f", with {factor:g} times accelerometer_walk and gyro_walk under [noise]"
+            if white > max(LIMITS.nearly_white, best.white if best else 0.0):
+                text = f"{words} explain the innovations: {advice}"
+                best = Explained(Finding("unmodelled", text, harm=EVERYTHING), white)
+            if white > LIMITS.risk:
+                return best
+            left = _off(recording, now)
+            if walks and left < much:
+                text = f"most of the innovations look like {words}, as with 1/f noise: {advice}"
+                most, much = Explained(Finding("unmodelled", text, harm=EVERYTHING), white), 0.5 * left
+            if left > before:
+                break
+            before = left
+    return best or most
 
 
-def _nearly_white(case: Case) -> bool:
-    """True where innovations are of the stated size, and hardly correlated: 1/f noise is no walk to the letter."""
-    now = filtered(case)
-    return sound(now) and whiteness(regular(case[0], now)) > LIMITS.nearly_white
+def _off(recording: Recording, now: FilterResult) -> float:
+    """Distance of innovations from white ones of the stated size: the largest, over both sensors, of what their mean
+    square is off and of their correlation from row to row."""
+    z, off = regular(recording, now), 0.0
+    for columns in (z[:, :3], z[:, 3:]):
+        products, squares = columns[1:] * columns[:-1], np.square(columns)
+        if np.isfinite(products).any():
+            mean = float(np.nanmean(squares))
+            off = max(off, abs(mean - 1.0), abs(float(np.nanmean(products))) / mean)
+    return off
+
+
+def _throughout(recording: Recording, now: FilterResult) -> bool:
+    """True where innovations are too large in most of the recording, as noise makes them, not in a part of it."""
+    squares = np.square(regular(recording, now))
+    if not np.isfinite(squares).any():
+        return False
+    parts = [part[np.isfinite(part)] for part in np.array_split(squares, LIMITS.even_parts)]
+    usual = float(np.median([part.mean() for part in parts if len(part)]))
+    return usual - 1.0 > 0.5 * (float(np.nanmean(squares)) - 1.0)
 
 
 def _with_states(problem: FilterProblem, kinds: tuple[str, ...], factor: float) -> FilterProblem:

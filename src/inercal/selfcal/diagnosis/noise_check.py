@@ -12,8 +12,8 @@ from inercal.estimate.consistency import whiteness
 from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
-from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular, sound, white
-from inercal.selfcal.diagnosis.needed_states import needed_states
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
+from inercal.selfcal.diagnosis.needed_states import Explained, needed_states
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 
@@ -47,7 +47,20 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
         return []  # readings against a base that sways are not independent
     if (swaying := _swaying(case, z)) is not None:
         return [swaying]
-    return [restless_gyros(case) or needed_states(case) or _unexplained(z)]
+    return [unsteady(case) or _unexplained(z)]
+
+
+def unsteady(case: Case, any_states: bool = True) -> Finding | None:
+    """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
+    other as possible too. States alone count with ``any_states`` only."""
+    noise, states = restless_gyros(case), needed_states(case)
+    found = [each for each in (noise, states if noise or any_states else None) if each]
+    if not found:
+        return None
+    best, *others = sorted(found, key=lambda each: -each.white)
+    also = "; ".join(each.finding.message.split(":")[0] for each in others if each.white > LIMITS.risk)
+    message = best.finding.message + (f"; equally possible: {also}" if also else "")
+    return replace(best.finding, message=message)
 
 
 def _swaying(case: Case, z: Array) -> Finding | None:
@@ -86,23 +99,24 @@ def _even(columns: Array, mean: float) -> bool:
     return True
 
 
-def restless_gyros(case: Case) -> Finding | None:
+@once
+def restless_gyros(case: Case) -> Explained | None:
     """Gyro noise other than stated that explains the innovations, if any."""
+    case = short(case)
     for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
-        fitting = list[float]()
+        fitting = dict[float, float]()
         for factor in 2.0**octaves:
-            if _explained_by_walk(case, factor):
-                fitting.append(float(factor))
+            if (left := _left_by_walk(case, factor)) > LIMITS.risk:
+                fitting[float(factor)] = left
             elif fitting:
                 break
         if fitting:
-            about = _two_digits(math.sqrt(fitting[0] * fitting[-1]))
-            text = f"the gyros' angle random walk looks about {about} times what is stated"
-            low, high = sorted((fitting[0], fitting[-1]))
+            low, high = min(fitting), max(fitting)
+            text = f"the gyros' angle random walk looks about {_two_digits(math.sqrt(low * high))} times what is stated"
             more = f" ({_two_digits(low)} to {_two_digits(high)})" if len(fitting) > 1 else ""
-            if octaves[0] > 0.0:
-                return Finding("excess_scatter", text + more, harm=EVERYTHING)
-            return Finding("low_scatter", text + more)
+            larger = octaves[0] > 0.0
+            code, harm = ("excess_scatter", EVERYTHING) if larger else ("low_scatter", ())
+            return Explained(Finding(code, text + more, harm=harm), max(fitting.values()))
     return None
 
 
@@ -111,14 +125,15 @@ def _two_digits(factor: float) -> str:
     return f"{float(f'{factor:.2g}'):g}"
 
 
-def _explained_by_walk(case: Case, factor: float) -> bool:
-    """True where a walk of the gyros, larger by a factor, leaves innovations white."""
+def _left_by_walk(case: Case, factor: float) -> float:
+    """Whiteness of innovations (`Explained`) with a walk of the gyros larger by a factor; 0 if it explains none."""
     recording, problem = case
     noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
-    tried = (recording, replace(problem, noise=noise))
-    now = filtered(tried)
+    now = filtered((recording, replace(problem, noise=noise)))
     # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
-    return white(tried, now) and float(np.nanmean(np.square(now.innovations[:, 3:]))) > LIMITS.walk_square
+    if not sound(now) or not float(np.nanmean(np.square(now.innovations[:, 3:]))) > LIMITS.walk_square:
+        return 0.0
+    return whiteness(regular(recording, now))
 
 
 def _unexplained(z: Array) -> Finding:

@@ -17,7 +17,7 @@ from inercal.arrays import Array
 from inercal.estimate.hypotheses import Fitted, Hypothesis
 from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.considered import innovation_slopes
-from inercal.selfcal.diagnosis.fit_quality import Case, Sums, filtered, together
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
@@ -84,41 +84,23 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     yield _asymmetry(about)
     constant = [of for of in WANDERING if f"{of}_walk_x" not in problem.names]
     names = tuple(name for of in constant for name in STATES[f"{of}_T1"].parameters)
-    wanders = _kept(
-        about,
-        LIMITS.wandering * len(names),
-        lambda case: _columns_by(about, case, [(wave, names) for wave in _waves(case[0])]),
-    )
+    wanders = kept(lambda case: _columns_by(about, case, [(wave, names) for wave in _waves(case[0])]))
     for k, of in enumerate(constant):
         yield _wander(of, wanders, slice(3 * k, 3 * k + 3))
 
 
 def _together(about: Judged, names: tuple[str, ...]) -> Columns:
-    """Columns of some parameters, all found in one run, where there is room for them, and then kept."""
-    all_of = _kept(about, len(names), lambda case: _columns(about, case, names))
-
-    def columns(asked: Case, some: Sequence[str]) -> Array:
-        if not _fit(about[0], len(names)):
-            return _columns(about, asked, some)
-        return all_of(asked)[:, :, [names.index(name) for name in some]]
-
-    return columns
+    """Columns of some parameters, all found in one run."""
+    all_of = kept(lambda case: _columns_by(about, case, [(case[0].warm, names)]))
+    return lambda case, some: all_of(case)[:, :, [names.index(name) for name in some]]
 
 
-def _fit(case: Case, count: int) -> bool:
-    """True where there is room for so many columns."""
-    recording = case[0]
-    return count * recording.th.size <= LIMITS.columns_at_once * together(recording)
-
-
-def _kept(about: Judged, count: int, columns: Callable[[Case], Array]) -> Callable[[Case], Array]:
-    """So many columns, where there is room for them, of the first case for all: a refit moves them by next to nothing,
-    and takes its residuals anew, so that it ends in the same place."""
+def kept(columns: Callable[[Case], Array]) -> Callable[[Case], Array]:
+    """Columns of the first case for all: a refit moves them by next to nothing, and takes its residuals anew, so that
+    it ends in the same place."""
     first = list[Array]()
 
     def of(asked: Case) -> Array:
-        if not _fit(about[0], count):
-            return columns(asked)
         if not first:
             first.append(columns(asked))
         return first[0]
@@ -126,29 +108,28 @@ def _kept(about: Judged, count: int, columns: Callable[[Case], Array]) -> Callab
     return of
 
 
-def _columns(about: Judged, case: Case, names: Sequence[str]) -> Array:
-    """Change (k, 6, m) of the innovations where an error of each of ``names`` (m,) is taken out."""
-    return _columns_by(about, case, [(case[0].warm, names)])
-
-
 def _columns_by(about: Judged, case: Case, errors: Sequence[tuple[Array | None, Sequence[str]]]) -> Array:
-    """The same of errors ``(course, names)``: those of temperature go with the ``course`` (n,) [K] instead."""
-    recording, problem = case
+    """Change (k, 6, m) of the innovations where errors ``(course, names)`` are taken out, one after the other: those of
+    temperature go with the ``course`` (n,) [K]."""
     now = about[1] if case is about[0] else filtered(case)
-    assert now.history is not None
-    along = now.history.attitude, now.coefficients
     ends = np.cumsum([len(names) for _, names in errors])
-    all_of = np.empty((0, 6, 0))
+    changes = np.empty((len(case[0].rate), 6, int(ends[-1])))
     for (course, names), end in zip(errors, ends, strict=True):
-        warmed = recording if course is recording.warm else replace(recording, warm=course)
-        sums = Sums(recording, now, len(names))
-        innovation_slopes(warmed, problem, *along, names, now.restarts, sums.take)
-        if len(errors) == 1:
-            return np.negative(sums.columns, out=sums.whole())
-        if not all_of.size:
-            all_of = np.empty((*sums.columns.shape[:2], int(ends[-1])))
-        np.negative(sums.whole(), out=all_of[:, :, end - len(names) : end])
-    return all_of
+        warmed = replace(case[0], warm=course), case[1]
+        changes[:, :, end - len(names) : end] = columns_of((warmed, now), names)
+    return changes
+
+
+def columns_of(about: Judged, names: Sequence[str]) -> Array:
+    """Change (k, 6, m) of the innovations, NaN where none counts, where errors of ``names`` (m,) are taken out."""
+    (recording, problem), now = about
+    assert now.history is not None
+    slopes = innovation_slopes(
+        recording, problem, now.history.attitude, now.coefficients, names, now.restarts
+    )
+    np.negative(slopes, out=slopes)
+    slopes[~np.isfinite(regular(recording, now))] = np.nan
+    return slopes
 
 
 def _stated_with(names: Sequence[str]) -> Callable[[Case, Array], Case]:
@@ -227,7 +208,7 @@ def _asymmetry(about: Judged) -> Hypothesis[Case]:
         shown = _shown(names, "1", fit)
         return f"the scale of the accelerometers is not the same both ways: {shown}; take it out of their readings"
 
-    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=_kept(about, 3, derivative))
+    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=kept(derivative))
 
 
 def _wander(of: str, columns: Callable[[Case], Array], mine: slice) -> Hypothesis[Case]:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,17 +21,15 @@ from inercal.findings import EVERYTHING
 from inercal.geometry.earth import EARTH_RATE
 from inercal.geometry.rotations import boxminus
 from inercal.records.places import counted
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, regular
-from inercal.selfcal.diagnosis.rig_errors import rig_errors
+from inercal.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, once, regular, short
+from inercal.selfcal.diagnosis.rig_errors import columns_of, kept, rig_errors
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS, World
-
-_CHUNK = 1 << 16
-"""Rows whose joints are held at once."""
+from inercal.selfcal.platform.states import MOST_WAVES
 
 Stated = Hypothesis[Case] | None
 """Errors of the systematic inputs of a study, None where all are exact."""
@@ -44,18 +43,29 @@ def likely(recording: Recording, problem: FilterProblem, systematic: Stated) -> 
     if systematic is None:
         return problem
     case = recording, problem
-    (fit,) = refitted(case, [tried(systematic, case)], JUDGE)
+    fewer = short(case)
+    (fit,) = refitted(fewer, [tried(systematic, fewer)], JUDGE)
     limit = sigmas(LIMITS.risk, len(fit.values))
     if not np.abs(fit.values).max() <= limit * systematic.prior:
         return problem
-    return fit.case[1]
+    return systematic.without(case, fit.values)[1]
 
 
+@once
 def small_errors(case: Case, systematic: Stated = None) -> tuple[Fits[Case], Case]:
     """Constant errors beside those of the systematic inputs, and the case without any of them."""
-    return search(
-        case, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, systematic, _with_those_alike
+    fewer = short(case)
+    fits, there = search(
+        fewer, constant_errors, JUDGE, LIMITS.risk, LIMITS.small_errors, systematic, _with_those_alike
     )
+    if fewer is case:
+        return fits, there
+    if not fits and systematic is None:
+        return fits, case
+    recording, problem = case
+    for fit in fits:
+        recording = fit.hypothesis.without((recording, problem), fit.values)[0]
+    return fits, (recording, replace(problem, world=there[1].world, vector=there[1].vector))
 
 
 def _with_those_alike(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
@@ -76,21 +86,21 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     now = filtered(case)
     if not now.converged:
         return
-    step = 1e-3 * EARTH_RATE
+    step, dt = 1e-3 * EARTH_RATE, float(np.median(case[0].dt))
     yield Hypothesis(
         "latitude", "site_suspect", _latitude, _other_earth, ("north", "up"), step, harm=EVERYTHING
     )
     if not case[1].states.has("delay"):
-        yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01, harm=EVERYTHING)
+        yield Hypothesis("delay", "command_shift", _delay, _delayed, ("delay",), 0.01 * dt, harm=EVERYTHING)
     yield from rig_errors(case, now)
     yield from _harmonics(case, now)
 
 
 def _delay(fit: Fitted[Case]) -> str:
     """The finding of late commands."""
-    rows, dt = float(fit.values[0]), float(np.median(fit.case[0].dt))
-    how = "later" if rows > 0.0 else "earlier"
-    return f"the platform acts {1e3 * abs(rows) * dt:.3g} ms {how} than its commands are logged"
+    late = float(fit.values[0])
+    how = "later" if late > 0.0 else "earlier"
+    return f"the platform acts {1e3 * abs(late):.3g} ms {how} than its commands are logged"
 
 
 def _latitude(fit: Fitted[Case]) -> str:
@@ -126,64 +136,95 @@ def directions(world: World) -> tuple[Array, Array]:
 
 
 def _delayed(case: Case, values: Array) -> Case:
-    """Commands that act later by a part of a row."""
+    """Commands that act later by a time [s]."""
     recording, problem = case
-    part = float(values[0])
-    before = np.vstack([recording.rate[:1], recording.rate[:-1]])
-    after = np.vstack([recording.rate[1:], recording.rate[-1:]])
-    other = before if part > 0.0 else after
-    return replace(recording, rate=recording.rate + abs(part) * (other - recording.rate)), problem
+    t, dt, late = recording.t, recording.dt[:, None], float(values[0])
+    turned = np.vstack([np.zeros(3), np.cumsum(recording.rate * dt, axis=0)])
+    more = abs(late) * recording.rate  # before the first row, and behind the last, it turns on
+    known = np.concatenate([[t[0] - abs(late)], t, [t[-1] + abs(late)]])
+    turned = np.vstack([turned[:1] - more[:1], turned, turned[-1:] + more[-1:]])
+    then = np.stack([np.interp(t - late, known, each) for each in turned.T], axis=-1)
+    return replace(recording, rate=np.diff(then, axis=0) / dt), problem
 
 
 def _harmonics(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
-    """Errors periodic in the angle of a joint: for each joint the order that its innovations show most."""
-    orders_tried, states = np.arange(1, LIMITS.harmonic_orders + 1), case[1].states
+    """Errors periodic in the angle of a joint: for each joint the order that its innovations show most, as long as
+    there is room for further states."""
+    recording, problem = case
+    states = problem.states
     estimated = [wave for k, wave in enumerate(states.harmonics) if f"harmonic_{k + 1}_sin" in states.names]
     angles, by_joint = _found_angles(case, now)
-    th = angles[1:]
+    waves = list[tuple[int, int]]()
     for joint in range(3):
-        used = np.isfinite(by_joint[:, joint] + th[:, joint])
-        angle, missed = th[used, joint], by_joint[used, joint]
+        angle, missed = angles[1:, joint], by_joint[:, joint]
+        used = np.isfinite(missed + recording.th[1:, joint])
         # half a period is the least from which an order is told from a constant
-        orders = orders_tried[orders_tried * np.ptp(angle) > math.pi] if used.any() else orders_tried[:0]
-        orders = np.setdiff1d(orders, [order for of, order in estimated if of == joint])
-        if len(orders):
-            powers = np.array([np.abs(np.exp(1j * order * angle) @ missed) for order in orders])
-            yield _harmonic(joint, int(orders[np.argmax(powers)]), angles[:, joint])
+        turned = np.ptp(angle[used]) if used.any() else 0.0
+        known = [order for of, order in estimated if of == joint]
+        powers = {
+            order: power
+            for order, power in enumerate(_powers(angle[used], missed[used]), 1)
+            if order * turned > math.pi and order not in known
+        }
+        if powers:
+            waves.append((joint, max(powers, key=lambda order: powers[order])))
+    taken = len(states.harmonics)
+    waves = waves[: MOST_WAVES - taken]
+    names = [f"harmonic_{taken + 1 + k}_{part}" for k in range(len(waves)) for part in ("sin", "cos")]
+    vector = replace(states, harmonics=(*states.harmonics, *waves))
+    # at rest angles as read change with their noise alone, and would explain it
+    found = replace(recording, th=angles), replace(problem, vector=vector)
+    columns = kept(lambda _: columns_of((found, now), names))
+    for k, (joint, order) in enumerate(waves):
+        yield _harmonic(joint, order, partial(_some, columns, slice(2 * k, 2 * k + 2)))
+
+
+def _some(columns: Callable[[Case], Array], which: slice, case: Case) -> Array:
+    """Some of the columns of a case."""
+    return columns(case)[:, :, which]
+
+
+def _powers(angle: Array, missed: Array) -> Array:
+    """Powers (k,) of innovations (m,) at the orders 1 .. k of angles (m,) [rad], each wave by the one before."""
+    once = np.exp(1j * angle)
+    wave, powers = once.copy(), np.empty(LIMITS.harmonic_orders)
+    for k in range(len(powers)):
+        powers[k] = abs(np.sum(wave * missed))
+        wave *= once
+    return powers
 
 
 def _found_angles(case: Case, now: FilterResult) -> tuple[Array, Array]:
-    """Gimbal angles (n, 3) [rad] that the filter found, and innovations (n - 1, 3) of the encoders about the joints. At
-    rest angles as read change with their noise alone, and would explain it."""
+    """Gimbal angles (n, 3) [rad] that the filter found, and innovations (n - 1, 3) of the encoders about the joints."""
     recording, problem = case
     assert now.history is not None
-    angles, missed = recording.th.copy(), regular(recording, now)[:, 3:]
-    for first in range(0, len(angles), _CHUNK):
-        some = slice(first, first + _CHUNK)
-        read, joints = gimbals(np.nan_to_num(recording.th[some]), problem.world)
-        inverse = np.linalg.pinv(joints, rcond=1e-3)
-        angles[some] -= np.einsum("kij,kj->ki", inverse, boxminus(read, now.history.attitude[some]))
-        later = slice(1 if first == 0 else 0, None)  # innovations begin with the second row
-        size = np.sqrt(np.square(joints[later]).sum(axis=2))
-        rows = slice(max(first - 1, 0), first + _CHUNK - 1)
-        missed[rows] = np.einsum("kij,kj->ki", inverse[later], missed[rows] * size)
-    return angles, missed
+    read, joints = gimbals(np.nan_to_num(recording.th), problem.world)
+    inverse = np.linalg.pinv(joints, rcond=1e-3)
+    angles = recording.th - np.einsum("kij,kj->ki", inverse, boxminus(read, now.history.attitude))
+    size = np.sqrt(np.square(joints[1:]).sum(axis=2))
+    return angles, np.einsum("kij,kj->ki", inverse[1:], regular(recording, now)[:, 3:] * size)
 
 
-def _harmonic(joint: int, order: int, angle: Array) -> Hypothesis[Case]:
-    """An error ``a sin(k th) + b cos(k th)`` of an encoder at angles th (n,)."""
-    waves = np.stack([np.sin(order * angle), np.cos(order * angle)])
+def _harmonic(joint: int, order: int, columns: Callable[[Case], Array]) -> Hypothesis[Case]:
+    """An error ``a sin(k th) + b cos(k th)`` of an encoder."""
 
     def without(case: Case, values: Array) -> Case:
         th = case[0].th.copy()
-        th[:, joint] -= values @ waves
+        at = order * th[:, joint]
+        th[:, joint] -= values[0] * np.sin(at) + values[1] * np.cos(at)
         return replace(case[0], th=th), case[1]
 
     def says(fit: Fitted[Case]) -> str:
         amplitude, periods = math.degrees(float(np.hypot(*fit.values))) * 3600.0, counted(order, "period")
         return f"{JOINTS[joint]} errs periodically with its angle: {amplitude:.2g} arcsec, {periods} a turn"
 
-    name, many = f"harmonic {order} of {JOINTS[joint]}", LIMITS.harmonic_orders
     return Hypothesis(
-        name, "unmodelled", says, without, ("sin", "cos"), 1e-6, alternatives=many, harm=EVERYTHING
+        f"harmonic {order} of {JOINTS[joint]}",
+        "unmodelled",
+        says,
+        without,
+        ("sin", "cos"),
+        alternatives=LIMITS.harmonic_orders,
+        harm=EVERYTHING,
+        derivative=columns,
     )

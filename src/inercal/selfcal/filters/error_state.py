@@ -32,9 +32,11 @@ from inercal.selfcal.platform.linearised import (
     Places,
     Step,
     accelerometer_row,
+    decorrelated_row,
     empty_columns,
     encoder_columns,
     encoder_roots,
+    encoder_row,
     propagate_covariance,
     wander,
 )
@@ -165,22 +167,14 @@ def encoder_update(
     miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
     if len(innovations) > 0:
         for i in range(3):
-            row.places[0], row.values[0] = i, 1.0
-            for a in range(count):
-                row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
-            innovations[i] = miss[i] / math.sqrt(innovation_variance(P, row, 1 + count, variances[i]))
+            size = encoder_row(i, columns, count, row)
+            innovations[i] = miss[i] / math.sqrt(innovation_variance(P, row, size, variances[i]))
     total = 0.0
     for i in range(3):
         root = roots[i]
-        for j in range(i + 1):
-            row.places[j], row.values[j] = j, root[j]
-        for a in range(count):
-            row.places[1 + i + a] = columns.places[a]
-            row.values[1 + i + a] = -(
-                root[0] * columns.axes[a, 0] + root[1] * columns.axes[a, 1] + root[2] * columns.axes[a, 2]
-            )
+        size = decorrelated_row(i, root, columns, count, row)
         z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
-        total += scalar_update(P, x, row, i + 1 + count, z, 1.0, work)
+        total += scalar_update(P, x, row, size, z, 1.0, work)
     return total
 
 

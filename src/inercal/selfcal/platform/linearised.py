@@ -268,6 +268,28 @@ def encoder_columns(
 
 
 @kernel
+def encoder_row(i: int, columns: Columns, count: int, row: Row) -> int:
+    """Put the derivative of the attitude that encoders have about axis ``i`` of p, less that of the state, into a
+    ``row``; returns the number of entries. ``count`` columns as of `encoder_columns`."""
+    row.places[0], row.values[0] = i, 1.0
+    for a in range(count):
+        row.places[1 + a], row.values[1 + a] = columns.places[a], -columns.axes[a, i]
+    return 1 + count
+
+
+@kernel
+def decorrelated_row(i: int, root: Vector, columns: Columns, count: int, row: Row) -> int:
+    """The same of the ``i``-th of their decorrelated scalars, of variance 1; ``root`` as of `encoder_roots`."""
+    for j in range(i + 1):
+        row.places[j], row.values[j] = j, root[j]
+    for a in range(count):
+        x, y, z = columns.axes[a, 0], columns.axes[a, 1], columns.axes[a, 2]
+        row.places[1 + i + a] = columns.places[a]
+        row.values[1 + i + a] = -(root[0] * x + root[1] * y + root[2] * z)
+    return 1 + i + count
+
+
+@kernel
 def accelerometer_row(i: int, sensed: Sensing, c: Array, place: Places, up: Vector, row: Row) -> int:
     """Put the derivative of accelerometer ``i`` by the error state into a ``row`` with room for `WIDEST` entries.
 

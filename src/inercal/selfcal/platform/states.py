@@ -1,4 +1,4 @@
-"""The one table of states that an estimator of a platform may have: names, units, priors, meaning, source.
+"""The one table of states that an estimator of a platform may have: names, priors, meaning, source.
 
 A platform is described by one array of all parameters, the *full vector* (K,), in the order of `ALL`: the 24 of
 `inercal.selfcal.platform.coefficients`, in the linear form, then those of the rig. An estimator has some of them as
@@ -19,20 +19,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.instruments.terms import term
 
 
 class State(NamedTuple):
-    """States of one kind: their ``parameters``, SI ``unit``, ``dimension`` of a quantity, usual ``prior``, an
-    ``example``, the meaning in ``words``, the ``key`` of a study, and the ``source`` of the equation."""
+    """States of one kind: their ``parameters``, ``dimension`` of a quantity, usual ``prior``, an ``example``, the
+    meaning in ``words``, the ``key`` of a study, and the ``source`` of the equation."""
 
     parameters: tuple[str, ...]
-    unit: str
     dimension: str
     prior: str
     example: str
     words: str
     key: str = ""
     source: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Their SI unit, that of the one table of terms."""
+        of = term(self.parameters[0])
+        assert of is not None
+        return of.unit_for("rad/s")  # of the gyros
 
 
 def _by_axis(name: str) -> tuple[str, str, str]:
@@ -49,87 +56,87 @@ _WARM = "IEEE Std 952 and 1293: coefficients of temperature"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
 STATES: Final[Mapping[str, State]] = {
-    "kg0": State(_by_axis("kg0"), "rad/s", "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases"),
+    "kg0": State(_by_axis("kg0"), "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases"),
     "eta": State(
-        ("eta_pz", "eta_oy", "eta_oz"), "rad", "angle", "300 arcsec", "60 arcsec",
+        ("eta_pz", "eta_oy", "eta_oz"), "angle", "300 arcsec", "60 arcsec",
         "misalignments eta of accelerometers, pz, oy, oz",
     ),
-    "ds": State(_by_axis("ds"), "rad", "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros"),
-    "do": State(_by_axis("do"), "rad", "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros"),
-    "ka0": State(_by_axis("ka0"), "m/s^2", "acceleration", "500 ug", "100 ug", "accelerometer biases"),
-    "ka1": State(_by_axis("ka1"), "1", "number", "1500 ppm", "500 ppm", "accelerometer scale errors"),
+    "ds": State(_by_axis("ds"), "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros"),
+    "do": State(_by_axis("do"), "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros"),
+    "ka0": State(_by_axis("ka0"), "acceleration", "500 ug", "100 ug", "accelerometer biases"),
+    "ka1": State(_by_axis("ka1"), "number", "1500 ppm", "500 ppm", "accelerometer scale errors"),
     "kg1": State(
-        _by_axis("kg1"), "1", "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model"
+        _by_axis("kg1"), "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model"
     ),
     "beta": State(
-        _by_axis("beta"), "rad", "angle", "60 arcsec", "5 arcsec",
+        _by_axis("beta"), "angle", "60 arcsec", "5 arcsec",
         "the encoders' zero, in the extended model",
     ),
     "gamma": State(
-        _by_axis("gamma"), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        _by_axis("gamma"), "angle", "20 arcsec", "0(20) arcsec",
         "turn of the sensors' axes p against the last gimbal, about the axes of p", "gamma", _CHAIN,
     ),
     "non_orthogonality": State(
-        ("nonorth_xy", "nonorth_yz"), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        ("nonorth_xy", "nonorth_yz"), "angle", "20 arcsec", "0(20) arcsec",
         "inner axis against the outer, turned about the last at zero angles; last axis against the inner, turned "
         "about the outer", "non_orthogonality", _CHAIN,
     ),
     "zero_y": State(
-        ("zero_y",), "rad", "angle", "20 arcsec", "0(20) arcsec",
+        ("zero_y",), "angle", "20 arcsec", "0(20) arcsec",
         "reading of the inner encoder where the joint is at zero", "zero_y", _CHAIN,
     ),
     "delay": State(
-        ("tau_enc", "tau_a"), "s", "time", "5 ms", "0(5) ms",
+        ("tau_enc", "tau_a"), "time", "5 ms", "0(5) ms",
         "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", _DELAY,
     ),
     "k2": State(
-        _by_axis("K2"), "1/(m/s^2)", "quadratic", "20 ug/g^2", "0(20) ug/g^2",
+        _by_axis("K2"), "quadratic", "20 ug/g^2", "0(20) ug/g^2",
         "second-order coefficients of accelerometers", "k2", _IEEE_1293,
     ),
     "levers": State(
-        tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "m", "length", "50 mm", "0(50) mm",
+        tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "length", "50 mm", "0(50) mm",
         "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z", "levers",
         "centripetal acceleration w x (w x r) of textbooks on mechanics",
     ),
     "scale_asymmetry": State(
-        _by_axis("S_asym"), "1", "number", "10 ppm", "0(10) ppm",
+        _by_axis("S_asym"), "number", "10 ppm", "0(10) ppm",
         "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
     "g_sensitivity": State(
-        tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "(rad/s)/(m/s^2)", "rate by force", "0.02 deg/h/g",
+        tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "rate by force", "0.02 deg/h/g",
         "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z", "g_sensitivity",
         "IEEE Std 952: acceleration-sensitive drift",
     ),
     "sag": State(
-        _by_axis("sag"), "rad/(m/s^2)", "angle by force", "2 arcsec/g", "0(2) arcsec/g",
+        _by_axis("sag"), "angle by force", "2 arcsec/g", "0(2) arcsec/g",
         "elastic turn of the sensors on the platform per specific force, by a mass off the centre along x, y, z",
         "sag", "Hooke's law",
     ),
     "kg0_T1": State(
-        tuple(f"kg0_{i}_T1" for i in "xyz"), "rad/s/K", "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
+        tuple(f"kg0_{i}_T1" for i in "xyz"), "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
         "gyro biases per kelvin", "kg0_T1", _WARM,
     ),
     "ka0_T1": State(
-        tuple(f"ka0_{i}_T1" for i in "xyz"), "m/s^2/K", "acceleration by temperature", "50 ug/K", "0(50) ug/K",
+        tuple(f"ka0_{i}_T1" for i in "xyz"), "acceleration by temperature", "50 ug/K", "0(50) ug/K",
         "accelerometer biases per kelvin", "ka0_T1", _WARM,
     ),
     "ka1_T1": State(
-        tuple(f"ka1_{i}_T1" for i in "xyz"), "1/K", "number by temperature", "20 ppm/K", "0(20) ppm/K",
+        tuple(f"ka1_{i}_T1" for i in "xyz"), "number by temperature", "20 ppm/K", "0(20) ppm/K",
         "accelerometer scale errors per kelvin", "ka1_T1", _WARM,
     ),
     "harmonics": State(
-        tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "rad", "angle", "5 arcsec",
+        tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "angle", "5 arcsec",
         "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
         "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "harmonics",
         "eccentric and elliptic circles of textbooks on surveying instruments",
     ),
     "gyro_walk": State(
-        _by_axis("kg0_walk"), "rad/s", "rate", "0.0005 deg/h", "0.0005 deg/h",
+        _by_axis("kg0_walk"), "rate", "0.0005 deg/h", "0.0005 deg/h",
         "gyro biases at the last row, less their means kg0", source=_MARKOV,
     ),
     "accelerometer_walk": State(
-        _by_axis("ka0_walk"), "m/s^2", "acceleration", "1.9 ug", "1.9 ug",
+        _by_axis("ka0_walk"), "acceleration", "1.9 ug", "1.9 ug",
         "accelerometer biases at the last row, less their means ka0", source=_MARKOV,
     ),
 }  # fmt: skip

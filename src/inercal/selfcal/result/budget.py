@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from inercal.estimate.budget import TypeA, TypeB
 from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.before.considered import sensitivities
+from inercal.selfcal.filters.averaged import averaged
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
@@ -102,20 +104,19 @@ def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, 
 
 
 def systematic(
-    recording: Recording, settings: SelfcalSettings, u: Array
+    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
     """Inputs of site and base stated with an uncertainty; and for each that is stated without one the error of it, in
     words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
     sources, exact = list[TypeB](), dict[str, str]()
     of = problem(settings)
+    fewer, judged = averaged(recording, of, filtered)
     for each in systematic_inputs(settings):
         if each.of_rig:
             continue
         by = each.u or each.step
-        ends = [
-            estimate(recording, problem(each.changed(change)), "error-state", history=False).coefficients
-            for change in (-by, by)
-        ]
+        moved = (replace(problem(each.changed(change)), noise=judged.noise) for change in (-by, by))
+        ends = [estimate(fewer, there, "error-state", history=False).coefficients for there in moved]
         slope = (to_product(ends[1]) - to_product(ends[0])) / (2.0 * by)
         worst = int(np.argmax(np.abs(slope) / u))
         if each.name == "gravity" and each.u:

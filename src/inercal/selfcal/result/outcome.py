@@ -104,7 +104,7 @@ def assemble(
     result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
     measured = np.isfinite(filtered.innovations)
     dof = float((measured.sum() if len(measured) else filtered.dims.sum()) - p - 3)
-    of_site, exact = systematic(recording, settings, np.sqrt(np.diag(by_filter)))
+    of_site, exact = systematic(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise.of_readings, max(dof, 1.0)), *of_site, *of_rig]
     uncertainty = combine(filtered.names, sources)

@@ -1,0 +1,209 @@
+"""Noise that a recording shows: turns that do not close as well as white noise says, and walks of biases.
+
+Variances by restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545): of the linear problem at the last
+pass of a fit, with all unknowns integrated out,
+
+    -2 ln L = sum ln |Q_k| + ln |H| + chi-square        Q_k = Q_k of the sensors + sum s_j Q_kj
+
+Its slope by s_j is sum tr(M_k Q_kj) - r_k^T W Q_kj W r_k with the residuals r and M_k = W - W A Z A^T W, where A Z A^T
+is the covariance of what the solution says of the interval; its curvature is taken from the intervals alone (Fisher's
+scoring), which only costs steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.strapdown.arrow import Chain, backward, forward
+from inercal.strapdown.batch import (
+    Fit,
+    fit,
+    followed_by,
+    information_of,
+    interval_covariance,
+    inverse,
+    left_over,
+    variances_of,
+)
+from inercal.strapdown.left_out import tests
+from inercal.strapdown.limits import LIMITS
+from inercal.strapdown.rests import Nodes
+from inercal.strapdown.samples import Samples
+from inercal.strapdown.settings import TURN_NOISE, WALKS, Noise, StrapdownSettings
+
+_PLACES = {"gyro_walk": 2, "accelerometer_walk": 3, "turn_attitude": 4, "turn_velocity": 5}
+
+
+class Solved(NamedTuple):
+    """A linear problem solved: sum of ``squares`` with those of the prior, ``deviance`` -2 ln L but for a constant,
+    residuals ``left`` (k, m) of the intervals, and covariance ``followed`` (k, m, m) of what the solution says of
+    them."""
+
+    squares: float
+    deviance: float
+    left: Array
+    followed: Array
+
+
+def solved(chain: Chain, prior: Array) -> Solved:
+    """Solve a linear problem; ``prior`` (p,) are sizes of its coefficients."""
+    m, p, count = chain.F.shape[1], len(prior), len(chain.rest)
+    n = 2 * m + 3 + p
+    H, g, rows, right = np.empty((n, n)), np.empty(n), np.empty((count, m + 3, n)), np.empty((count, m + 3))
+    forward(chain, H, g, rows, right)
+    information = information_of(H, p)
+    covariance = inverse(information, prior)
+    step, x, angles = covariance @ g[-p:], np.empty((count, m)), np.empty((count, 3))
+    backward(chain.rest, rows, right, step, x, angles)
+    left = left_over(chain, step, x)
+    squares = np.einsum("ki,kij,kj->", left, chain.W, left)
+    velocity = chain.velocity * np.sum((chain.v + x[:, 3:6]) ** 2)
+    attitude = chain.attitude * np.sum((chain.angles + x[:, :3] - angles) ** 2)
+    known = np.sum(chain.start * (chain.begin + x[0]) ** 2) + np.sum(chain.prior * (chain.c + step) ** 2)
+    pivots = np.einsum("kii->ki", rows[:, :, : m + 3])
+    ends = np.append(np.diff(chain.rest) != 0, True) & (chain.attitude > 0.0)
+    volume = np.sum(np.log(pivots[:, :m])) + np.sum(np.log(pivots[ends, m:]))
+    volume += np.linalg.slogdet(information * np.outer(prior, prior))[1] - np.linalg.slogdet(chain.W)[1].sum()
+    said = followed_by(chain, rows, covariance)
+    total = float(squares + velocity + attitude + known)
+    return Solved(total, total + float(volume), left, said.out)
+
+
+def _scored(fit: Fit, fixed: Array, parts: Array, s: Array) -> tuple[Array, float]:
+    """Variances of largest likelihood, from ``s`` (q,) on, of the ``parts`` (q, k, m, m) of the covariance beside what
+    is ``fixed`` (k, m, m), and the deviance there."""
+    least, deviance, factor = 1e-8 * s, np.inf, 1.0
+    kept = s
+    for _ in range(LIMITS.scoring):
+        W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", s, parts)))
+        now = solved(fit.chain._replace(W=W), fit.prior)
+        if now.deviance > deviance + 1e-6:  # the step was too long
+            factor *= 0.5
+            s = np.exp(np.log(kept) + 0.5 * (np.log(s) - np.log(kept)))
+            if factor < 1e-2:
+                break
+            continue
+        gain, deviance, kept, factor = deviance - now.deviance, now.deviance, s, 1.0
+        if gain < LIMITS.scoring_gain:
+            break
+        M = W - W @ now.followed @ W
+        weighted = np.einsum("kab,kb->ka", W, now.left)
+        of_data = np.einsum("ka,qkab,kb->q", weighted, parts, weighted)
+        through = np.einsum("kab,qkbc->qkac", M, parts)
+        slope = 0.5 * (of_data - np.einsum("qkaa->q", through))
+        curvature = 0.5 * np.einsum("pkab,qkba->pq", through, through)
+        step = np.linalg.lstsq(curvature, slope, rcond=1e-10)[0]
+        s = np.clip(np.maximum(s + step, 0.1 * s), least, 30.0 * s)
+    return kept, float(deviance)
+
+
+class Found(NamedTuple):
+    """Noise found from a recording, by how much -2 ln L falls by it (where no walks are among it, which have states of
+    their own), and the fit with it."""
+
+    noise: Noise
+    gain: float
+    fit: Fit
+
+
+def _started(noise: Noise, names: tuple[str, ...], by: float) -> Noise:
+    """The noise with something to begin with in place of what is to be estimated: walks that in so many seconds ``by``
+    do as much as white noise, and turns of 10 arcsec and 1 mm/s."""
+    usual = {
+        "gyro_walk": noise.angle_random_walk / by,
+        "accelerometer_walk": noise.velocity_random_walk / by,
+        "turn_attitude": 5e-5,
+        "turn_velocity": 1e-3,
+    }
+    return _changed(noise, {name: getattr(noise, name) or usual[name] for name in names})
+
+
+def _changed(noise: Noise, sizes: Mapping[str, float]) -> Noise:
+    """The noise with other sizes of these fields."""
+    return replace(noise, **cast(dict[str, Any], dict(sizes)))
+
+
+def with_noise(
+    samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit, names: tuple[str, ...]
+) -> Found | None:
+    """The noise of the ``names`` among `settings.ESTIMABLE` as a recording shows it, and a fit with it, from a fit
+    without; None where that runs off."""
+    with np.errstate(all="ignore"):
+        try:
+            found = _iterated(samples, nodes, settings, fitted, names)
+        except np.linalg.LinAlgError:
+            return None
+    sound = found is not None and np.isfinite(found.gain)
+    return found if found and sound and found.noise.turn_attitude < LIMITS.wildest_turn else None
+
+
+def _iterated(
+    samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit, names: tuple[str, ...]
+) -> Found | None:
+    """The noise, of fits and linear problems in turns; raises `numpy.linalg.LinAlgError` where a matrix is singular."""
+    noise, deviance = _started(settings.noise, names, LIMITS.walk_start), 0.0
+    places, before = [_PLACES[name] for name in names], solved(fitted.chain, fitted.prior).deviance
+    for _ in range(LIMITS.noise_rounds):
+        now = replace(settings, noise=noise)
+        again = fit(samples, nodes, now, fitted)
+        if again is None:
+            return None
+        fitted = again
+        variances = variances_of(noise)
+        s, fixed = variances[places], variances.copy()
+        fixed[places] = 0.0
+        of_others, *parts = (
+            interval_covariance(fitted, samples, now, each) for each in (fixed, *np.eye(6)[places])
+        )
+        found, deviance = _scored(fitted, of_others, np.stack(parts), s)
+        if np.all(np.abs(np.log(found / s)) < LIMITS.noise_step):
+            break
+        noise = _changed(noise, dict(zip(names, np.sqrt(found).tolist(), strict=True)))
+    return Found(noise, before - deviance, fitted)
+
+
+def with_noise_shown(
+    samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit
+) -> tuple[StrapdownSettings, Fit]:
+    """The study with the noise that it leaves to the recording, and the fit with that.
+
+    Walks are estimated where the study asks for it; what turns add, where they leave too much, unless an effect outside
+    the model that `left_out` knows, or a prior that cannot be, explains more of it.
+    """
+    asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
+    names = [name for name in WALKS if name in asked]
+    _, turns = residuals(fitted)
+    if turns > LIMITS.turn_excess:
+        names += [name for name in TURN_NOISE if name in asked]
+    found = with_noise(samples, nodes, settings, fitted, tuple(names)) if names else None
+    if found is None:
+        return settings, fitted
+    if not found.noise.walks and max(_of_others(fitted, settings)) > found.gain:
+        return settings, fitted
+    return replace(settings, noise=found.noise), found.fit
+
+
+def _of_others(fitted: Fit, settings: StrapdownSettings) -> tuple[float, float]:
+    """By how much chi-square falls by the effect outside the model that explains most, and by a wider prior of what
+    lies far outside its own."""
+    named, c = tests(fitted, settings), fitted.c[fitted.free]
+    far = np.abs(c) > LIMITS.far_from_prior * fitted.prior
+    wider = fitted.chain._replace(prior=np.where(far, 1e-4, 1.0) * fitted.chain.prior)
+    by_prior = solved(fitted.chain, fitted.prior).squares - solved(wider, fitted.prior).squares
+    return (named[0].drop if named else 0.0), by_prior
+
+
+def residuals(fitted: Fit) -> tuple[float, float]:
+    """Residuals over the noise within rests, and over turns: rms by the degrees of freedom that the fit leaves."""
+    turns = np.zeros(len(fitted.squares), dtype=bool)
+    turns[fitted.nodes.turns] = True
+    rest, turn = (
+        float(np.sqrt(fitted.squares[which].sum() / fitted.redundancy[which].sum()))
+        for which in (~turns, turns)
+    )
+    return rest, turn
