@@ -126,6 +126,19 @@ def test_a_snap_is_chosen_by_its_size_and_not_by_noise():
     assert decided(loud, study()).estimator.snap is None
 
 
+@pytest.mark.parametrize("states", [8, 19])
+@pytest.mark.parametrize("kind", ["sine", "rest"])
+def test_at_20_hz_the_usual_snap_would_be_too_free(kind, states):
+    """With it the square of what the rate may do in 50 ms counted as a bias of 3 mg: 0.1 deg at rest and 6 u with 8
+    states, thousands of degrees in a sine with 19."""
+    run = simulate(Tunnel(kind, duration=40.0, fs=20.0, constants=float(states == 19)), 1)
+    recording, settings = plain(run.t, run.acc, run.gyro), study(states)
+    filtered = estimate(recording, problem(decided(recording, settings)))
+    error = (filtered.theta - run.theta)[run.t > 5.0]
+    assert np.sqrt(np.mean(error**2)) < 0.06 * DEG
+    assert np.sqrt(np.mean(np.square(error / filtered.u[run.t > 5.0]))) < 2.0
+
+
 def test_pick_up_that_a_large_snap_could_take_for_motion_is_taken_out():
     """Its phases are such that a snap of 1e12 fits it at 50 Hz too: 0.09 deg and 3.4 u off."""
     recording, run = recorded("mains 50 mg", 1015, duration=30.0, kind="polar")

@@ -196,6 +196,10 @@ class Limits:
     snap_ratio: float = 1.4
     """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
 
+    square_share: float = 4.0
+    """Square of the rate that a snap leaves free from row to row, times the longest arm, over an accelerometer's noise,
+    at most."""
+
     snap_excess: float = 0.08
     """Excess of it over one from which a snap that is ten times as large is taken where it takes as much away."""
 

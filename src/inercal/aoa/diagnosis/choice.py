@@ -64,12 +64,12 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     if stated and settings.estimator.snap is not None:
         return settings
     settings = _with_delay(delay, _with_offsets(recording, settings))
+    densities = _densities(settings)
+    settings = _with_snap(settings, densities[0])
     plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     stretches = [_part(recording, rows) for rows in _liveliest(recording)]
     if not stretches:
         return plain
-    usual, fixed = settings.estimator.density, settings.estimator.snap is not None
-    densities = (usual,) if fixed else (usual, *DENSITIES)
     fair = _fair(stretches[0], settings)
     bands = (plain.band, *(() if stated else _bands(stretches[0], fair)))
     # lines first: a snap that is large enough may take pick-up for motion
@@ -83,6 +83,25 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
                 fitting = _with_snap(replace(settings, band=band, prior=prior), density)
                 return _calmer(stretches, settings.prior, fitting)
     return plain
+
+
+def _densities(settings: AoaSettings) -> tuple[float, ...]:
+    """Densities of snap that are tried, the smallest first: the stated one, or the usual one and larger ones.
+
+    At low rates the usual one would leave the rate w so free from row to row, by q dt^5 / 20, that the square of this
+    in r w^2 is more than noise, which no linear filter allows for: there they begin with a smaller one.
+    """
+    usual, arm = settings.estimator.density, float(np.abs(settings.layout.r).max())
+    if settings.estimator.snap is not None:
+        return (usual,)
+    if not (settings.band.rate > 0.0 and arm > 0.0):
+        return (usual, *DENSITIES)
+    free = LIMITS.square_share * settings.noise.accelerometer / arm
+    least = 20.0 * free * settings.band.rate**5
+    if least >= usual:
+        return (usual, *DENSITIES)
+    steps = math.ceil(math.log10(DENSITIES[-1] / least))
+    return tuple(least * 10.0**k for k in range(steps))
 
 
 def _density(
