@@ -81,7 +81,9 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
             tried = replace(fair, band=band, prior=prior)
             if (density := _density(recording, stretches, tried, densities, most)) is not None:
                 fitting = _with_snap(replace(settings, band=band, prior=prior), density)
-                return _calmer(stretches, settings.prior, fitting)
+                # under the liveliest model nothing is left to tell flexure by
+                lively = density == DENSITIES[-1]
+                return fitting if lively else _calmer(stretches, settings.prior, fitting)
     return plain
 
 
