@@ -43,7 +43,7 @@ READ_A_STUDY = {
     *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
-WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun"} | {
+WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
     f"store {kind}" for kind in ("init", "upgrade", "check", "export", "import")
 }
 TEMPLATES = {
