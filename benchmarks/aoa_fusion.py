@@ -45,11 +45,11 @@ def plain(of, settings, recording):
 
 def live(of, recording, rows: int) -> list[float]:
     """Seconds on the wall of each of some rows fed by themselves, after the start."""
-    going, each = Live(of), []
+    going, each, rows_of = Live(of), [], recording.rows
     for k in range(rows):
-        t, acc, gyro = float(recording.t[k]), recording.acc[k], float(recording.gyro[k])
+        t, readings = float(recording.t[k]), rows_of[k]
         clock = WALL()
-        going.feed(t, acc, gyro)
+        going.feed(t, readings)
         each.append(WALL() - clock)
     return each[LIMITS.starting_rows :]
 

@@ -117,7 +117,7 @@ CODES: dict[str, Code] = {
     "other_model": Code("two calibrations are not of the same kind", _ALWAYS),
     "same_recording": Code("two calibrations rest on the same recording", _NEVER),
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
-    "flexure": Code("the support of the model shakes its sensors", _ALWAYS),
+    "flexure": Code("the support of the model shakes its sensors", _BY_SIZE),
     "wide_flexure": Code("the support shakes the model beyond its usual flexure, which u allows for", _NEVER),
     "band_limited": Code("vibration is taken out of the sensors, motion above the band with it", _NEVER),
     "beyond_limits": Code("an angle is beyond the limits that the study states", _NEVER),

@@ -35,6 +35,8 @@ class Twin:
         """Real or complex."""
         layout, k = self.settings.layout, i + 1
         g, theta, w, al = self.settings.site.gravity, x[0], x[1], x[2]
+        vertical = self.settings.prior.heave.vertical
+        g = g + vertical * self.of(x, "flexure_z")
         r, z = layout.r[i] + self.of(x, f"dr_{k}"), layout.z[i] + self.of(x, f"zo_{k}")
         if self.spatial:
             phi, p, y = self.of(x, "phi"), p - self.of(x, "b_roll"), y - self.of(x, "b_yaw")
@@ -46,7 +48,7 @@ class Twin:
         if self.spatial:
             fx = g * np.sin(theta) - r * (w**2 + y**2) - z * (al - p * y)
             fz = g * np.cos(theta) * np.cos(phi) + r * (al + p * y) - z * (w**2 + p**2)
-        fx, fz = fx + self.of(x, "flexure_x"), fz + self.of(x, "flexure_z")
+        fx, fz = fx + self.of(x, "flexure_x"), fz + (not vertical) * self.of(x, "flexure_z")
         angle = layout.angle[i]
         return fx * math.cos(angle) - fz * math.sin(angle) + self.of(x, f"b_{k}")
 

@@ -138,6 +138,10 @@ def test_accelerometers_as_good_as_the_goal_asks_for():
     reached = fusion_bound(designs._times(of, found.factor), found.best.layout)
     assert reached == pytest.approx(0.02 * DEG, rel=0.03)
     assert found.result["accelerometer"] == pytest.approx(1e-4 * G * found.factor)
+    times, u = np.array(found.qualities).T
+    assert (np.diff(u) > 0.0).all()
+    assert u[times == pytest.approx(1.0)] == pytest.approx(found.best.fusion)
+    assert designs._factor(of, found.best.layout, 0.02 * DEG, found.qualities) == found.factor
     never = design(replace(of, goal=Goal(1e-6 * DEG)))
     assert math.isnan(never.factor)
     (missed,) = never.findings
@@ -183,6 +187,7 @@ def test_the_command_writes_sensors_that_a_study_can_have(tmp_path, capsys):
         run([*words, "--out", str(tmp_path / "sensors.toml"), "--report", str(tmp_path / "page.html")]) == 0
     )
     assert "as stated" in capsys.readouterr().out
+    assert "How u depends on base line and accelerometers" in (tmp_path / "page.html").read_text()
     sensors = tomllib.loads((tmp_path / "sensors.toml").read_text())["sensors"]
     assert sorted(sensors) == ["a1", "a2", "a3"]
     head, _, tail = STUDY.partition("[sensors.a1]")

@@ -112,8 +112,7 @@ def test_rows_blocks_and_the_smoother_go_on_alike():
     recording = simulate(study(19, motion=SLOW), np.random.default_rng(20261121)).recording
     whole, smoothed = estimate(recording, of), estimate(recording, of, smoothed=True)
     live = Live(of)
-    samples = zip(recording.t, recording.acc, recording.gyro, strict=True)
-    out = [live.feed(t, acceleration, gyro).out for t, acceleration, gyro in samples]
+    out = [live.feed(t, readings).out for t, readings in zip(recording.t, recording.rows, strict=True)]
     np.testing.assert_array_equal(np.concatenate(out)[:, 0], whole.theta)
     assert smoothed.theta[-1] == pytest.approx(whole.theta[-1], abs=1e-12)
     assert smoothed.u[-1] == pytest.approx(whole.u[-1], rel=1e-9)

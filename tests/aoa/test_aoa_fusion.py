@@ -21,18 +21,21 @@ from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Attitude, Estimator, MotionPlan, Timing
+from inercal.aoa.settings import Attitude, Estimator, MotionPlan, Prior, Resonance, Timing
 from inercal.aoa.simulate import simulate
 from inercal.units import Quantity, parse_unit
 
 ROLLED = Attitude(roll=Quantity(0.5, 1e-3, parse_unit("rad"), ""))
 COUPLED = Disturbances(yaw=Oscillation(1.0 * DEG, 8.0), roll=Oscillation(2.0 * DEG, 3.0))
 WANDERING = replace(NOISE, accelerometer_walk=1e-3 * G, gyro_walk=0.1 * DEG)
+PLUNGING = replace(Prior(), heave=Resonance(25.0, 0.9, 0.3, vertical=True))
 CASES = {
     "8": ({"states": 8}, False),
     "11, rolled": ({"states": 11, "attitude": ROLLED}, False),
     "15": ({"states": 15}, False),
     "19": ({"states": 19}, False),
+    "19, plunge": ({"states": 19, "prior": PLUNGING}, False),
+    "15, plunge, spatial": ({"states": 15, "prior": PLUNGING, "disturbances": COUPLED}, True),
     "19, delay": ({"states": 19, "timing": Timing(gyro_delay=None)}, False),
     "8, known delay": ({"states": 8, "timing": Timing(gyro_delay=2e-3)}, False),
     "8, spatial": ({"states": 8, "disturbances": COUPLED}, True),

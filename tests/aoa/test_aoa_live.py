@@ -78,12 +78,7 @@ def test_sample_by_sample(spatial):
     found = estimate(recording, of)
     assert len(found.starts) == 4  # at first, and after each of three gaps
     live = Live(of)
-    parts = [
-        live.feed(t, acc, gyro, *turns, *stated)
-        for t, acc, gyro, turns, stated in zip(
-            recording.t, recording.acc, recording.gyro, recording.turns, recording.zero_angle, strict=True
-        )
-    ]
+    parts = [live.feed(t, readings) for t, readings in zip(recording.t, recording.rows, strict=True)]
     # the first row has no stamp and is answered at once; then twenty are held, one more among them runs backward
     assert [len(part.t) for part in parts[:25]] == [1, *[0] * 20, 21, 1, 1, 1]
     same(joined([*parts, live.finish()]), found, recording.t)
@@ -108,9 +103,7 @@ def test_in_blocks_of_any_size(sizes, seed, spatial):
         block = rows_of(recording, slice(at, at + size))
         at += len(block.t)
         if len(block.t) == 1:
-            parts.append(
-                live.feed(block.t[0], block.acc[0], block.gyro[0], *block.turns[0], *block.zero_angle[0])
-            )
+            parts.append(live.feed(block.t[0], block.rows[0]))
         else:
             parts.append(live.feed_block(block))
         if k % 3 == 0:
@@ -197,7 +190,7 @@ def test_the_angle_comes_with_the_sample():
     made = simulate(of, np.random.default_rng(5))
     live, recording = Live(problem(of)), made.recording
     for k, truth in enumerate(made.theta):
-        told = live.feed(recording.t[k], recording.acc[k], recording.gyro[k])
+        told = live.feed(recording.t[k], recording.rows[k])
         if k >= LIMITS.starting_rows:
             assert len(told.t) == 1
             assert abs(told.angles.theta[0] - truth) < 5.0 * told.angles.u[0]

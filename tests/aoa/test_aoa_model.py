@@ -21,7 +21,7 @@ pytestmark = pytest.mark.kernels
 STATES = (8, 11, 15, 19)
 
 
-def made(states=19, spatial=False, delay=0.0, roll=0.0):
+def made(states=19, spatial=False, delay=0.0, roll=0.0, plunge=False):
     """The problem of a study with heights, so that each term counts."""
     settings = study(
         states, timing=Timing(delay), attitude=Attitude(roll=Quantity(roll, 0.0, parse_unit("rad"), ""))
@@ -29,7 +29,7 @@ def made(states=19, spatial=False, delay=0.0, roll=0.0):
     of = problem(replace(settings, layout=replace(settings.layout, z=np.array([0.05, -0.03, 0.04]))), spatial)
     # an axis that is square to nothing
     of.geometry[1, :2] = math.cos(0.4), math.sin(0.4)
-    return of
+    return replace(of, constants=of.constants._replace(plunge=float(plunge)))
 
 
 def state(of, seed):
@@ -73,6 +73,7 @@ CASES = st.fixed_dictionaries(
         "spatial": st.booleans(),
         "delay": st.sampled_from([0.0, 2e-3, None]),
         "roll": st.sampled_from([0.0, 0.6]),
+        "plunge": st.booleans(),
     }
 )
 
@@ -171,6 +172,19 @@ def test_at_rest_an_accelerometer_reads_g_sin_of_the_angle_from_its_axis():
             assert read(of, x, i)[0] == pytest.approx(G * math.sin(theta - axis), abs=1e-12)
 
 
+def test_a_plunge_is_felt_as_more_gravity_and_heave_across_the_body():
+    for theta in (-0.7, 0.2, 1.3):
+        for plunge in (False, True):
+            of = made(plunge=plunge)
+            x = np.zeros(of.size)
+            x[0] = theta
+            still = np.array([read(of, x, i)[0] for i in range(of.count)])
+            x[of.places.resonators + 1] = 0.5
+            shaken = np.array([read(of, x, i)[0] for i in range(of.count)])
+            felt = 0.5 / G * still if plunge else -0.5 * of.geometry[:, 1]
+            np.testing.assert_allclose(shaken - still, felt, atol=1e-12)
+
+
 @settings(max_examples=30, deadline=None)
 @given(tau=st.floats(-5e-3, 5e-3), seed=st.integers(0, 10**6))
 def test_a_late_gyro_reads_the_rate_of_before(tau, seed):
@@ -188,7 +202,7 @@ def continuous(of):
     A[0, 1] = A[1, 2] = A[2, 3] = 1.0
     N[3, 3] = of.constants.snap
     for b in range(2 if d > 4 else 0):
-        w0, zeta, level = of.constants[-6:][3 * b : 3 * b + 3]
+        w0, zeta, level = of.constants[-7:-1][3 * b : 3 * b + 3]
         s = 4 + 2 * b
         A[s : s + 2, s : s + 2] = [[0.0, 1.0], [-(w0**2), -2.0 * zeta * w0]]
         N[s + 1, s + 1] = 4.0 * zeta * w0 * level**2

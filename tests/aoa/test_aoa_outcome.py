@@ -230,15 +230,6 @@ def test_a_coefficient_at_its_prior_is_one_finding_and_no_bad_status():
     assert result.status is Status.OK
 
 
-def test_a_shaking_sting_is_said_and_a_rigid_one_is_not(sound):
-    result, *_ = assembled(scenario("flexure", duration=6.0))
-    said = [each.message for each in result.findings if each.code == "flexure"]
-    assert len(said) == 1
-    assert "20 %" in said[0]
-    assert "flexure" in result.message
-    assert not [each for each in sound[0].findings if each.code == "flexure"]
-
-
 def test_too_few_angles_are_no_result():
     settings = study(motion=replace(SINE, duration=2.0))
     made = simulate(settings, np.random.default_rng(2)).recording

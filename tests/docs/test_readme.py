@@ -30,9 +30,6 @@ HEADINGS = (
 #: the one command of "Before you rely on it", which takes some ten seconds and is run by test_validate_command
 RUN_ELSEWHERE = ["inercal validate --report validation.html"]
 
-#: how the commands begin that end `suspect`, as the README says of the example: the stream shakes its sting
-SUSPECT = "inercal aoa sting/"
-
 
 def commands(heading: str) -> list[str]:
     """The lines of a section that begin with ``inercal``, without their comments."""
@@ -97,7 +94,7 @@ def test_the_commands_run(heading, tmp_path, monkeypatch, capsys):
         given = (tmp_path / source).read_text("utf-8") if source else ""
         monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(given.encode())))
         code = run(shlex.split(words)[1:])
-        assert code == line.startswith(SUSPECT), f"{line}\n{capsys.readouterr().err}"
+        assert code == 0, f"{line}\n{capsys.readouterr().err}"
 
 
 def test_no_command_is_left_out():

@@ -191,8 +191,8 @@ def test_a_model_on_its_side_is_refused():
         live("t [s],a1 [g],a2 [g],a3 [g],gyro [deg/s]\n0,0,0,0,0\n", study(attitude=on_side))
 
 
-def test_the_zero_is_put_in_where_the_file_has_it(tmp_path):
-    """A model at rest at an angle that is known: the angle is better known after than without."""
+def test_the_zero_is_put_in_once_it_is_over_as_the_file_has_it(tmp_path):
+    """A model at rest at an angle that is known: better known after than without, to the digits of the file."""
     rest = replace(BASE, kind="static", duration=1.0, first=3.0 * DEG, last=3.0 * DEG)
     settings = study(motion=rest, zero=Zero(0.2, 0.8, 3.0 * DEG, 1e-4 * DEG))
 
@@ -202,11 +202,30 @@ def test_the_zero_is_put_in_where_the_file_has_it(tmp_path):
 
     text = recorded(tmp_path, settings, 5, gaps)
     out = live(text, settings)
-    assert out == of_file(text, settings, tmp_path)
+    over = 802 + 1  # of the head and the row by which it is seen that the stretch is over
+    assert out[over:] == of_file(text, settings, tmp_path)[over:]
     plain = live(text, replace(settings, zero=None))
+    assert out[:over] == plain[:over]
     u, without = ([float(line.split(",")[2]) for line in lines[1:]] for lines in (out, plain))
-    assert u[:200] == without[:200]
     assert u[-1] < 0.9 * without[-1]
+
+
+def test_a_zero_in_slight_buffet_is_averaged_and_one_in_motion_left_out(tmp_path):
+    """0.03 deg rms: the digits of the file, which allows for it. A sweep in the stretch: said, as without a zero."""
+    buffet = replace(BASE, kind="buffet", duration=4.0, mean=3.0 * DEG, rms=0.03 * DEG, low=2.0, high=10.0)
+    settings = study(motion=buffet, zero=Zero(0.0, 3.0, 3.0 * DEG, 1e-3 * DEG))
+    text, said = recorded(tmp_path, settings, 6), []
+    out = live(text, settings, said=said)
+    assert [each.code for each in said] == ["not_at_rest"]
+    assert "is averaged" in said[0].message
+    over = 3002 + 1
+    assert out[over:] == of_file(text, settings, tmp_path)[over:]
+    sweep = replace(BASE, kind="static", duration=4.0, first=0.0, last=4.0 * DEG)
+    moving, said = replace(settings, motion=sweep), []
+    text = recorded(tmp_path, moving, 7)
+    assert live(text, moving, said=said) == live(text, replace(moving, zero=None))
+    assert "the zero is left out" in said[0].message
+    assert said[0].harm
 
 
 @pytest.mark.slow

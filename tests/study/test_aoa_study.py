@@ -78,7 +78,8 @@ def test_all_that_settings_hold_is_reached():
     found = study(
         prior={
             "lever_common": "4 mm", "lever": "2 mm", "height": "1 cm", "gyro_scale": "0.2 %", "gyro_delay": "1 ms",
-            "heave": {"frequency": "7 Hz", "damping": 0.2, "level": "0.02 g"}, "axial": {"level": "1 mg"},
+            "heave": {"frequency": "7 Hz", "damping": 0.2, "level": "0.02 g", "direction": "vertical"},
+            "axial": {"level": "1 mg"},
         },
         timing={"gyro_delay": "-2 ms", "common_delay": "1 ms"},
         estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9},
@@ -108,6 +109,8 @@ def test_all_that_settings_hold_is_reached():
     assert (prior.gyro_scale, prior.gyro_delay) == pytest.approx((2e-3, 1e-3))
     heave = prior.heave
     assert (heave.frequency, heave.damping, heave.level) == pytest.approx((7 * two_pi, 0.2, 0.02 * G))
+    assert heave.vertical
+    assert not prior.axial.vertical
     assert (prior.axial.frequency, prior.axial.level) == pytest.approx((12 * two_pi, 1e-3 * G))
     assert (found.timing.gyro_delay, found.timing.common_delay) == pytest.approx((-2e-3, 1e-3))
     assert found.timing.common_delay_u == 0.0
@@ -190,6 +193,7 @@ REFUSED = {
     "prior.lever=0 mm": "prior.lever: .*above zero",
     "prior.lever=3 m": "prior.lever: .*mm given as m",
     "prior.heave.damping=1": "prior.heave.damping: .*below 1",
+    "prior.heave.direction=up": "prior.heave.direction",
     "prior.heav.damping=0.1": "prior.heav: unknown key, did you mean heave?",
     "motion.kind=wobble": "motion.kind: found 'wobble', expected 'static'",
     "motion.kind=chirp": "motion: low: missing, expected it with kind = 'chirp'",

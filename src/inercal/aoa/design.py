@@ -63,7 +63,10 @@ _NO_NOISE = 1e-9
 _FACTORS = (1e-2, 1e2)
 """Accelerometers that are looked at: times better and worse than stated."""
 
-_BASE_LINES = (0.25, 0.5, 0.75, 1.0)
+_QUALITIES = 13
+"""So many of them."""
+
+_BASE_LINES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Parts of the best layout's positions whose bounds are shown."""
 
 
@@ -83,12 +86,14 @@ class Designed:
 
     ``factor``: times the stated noise and bias of the accelerometers with which the best layout reaches the wanted u;
     NaN without a goal, or where none reaches it. ``base_lines``: parts of the best positions, and the bounds there.
+    ``qualities``: times the stated noise and bias of the accelerometers, and u [rad] of the best layout by the fusion.
     """
 
     best: Candidate
     stated: Candidate
     ranked: tuple[Candidate, ...]
     base_lines: tuple[tuple[float, Candidate], ...]
+    qualities: tuple[tuple[float, float], ...]
     factor: float
     message: str
     result: dict[str, Any] = field(default_factory=dict)
@@ -149,7 +154,9 @@ def design(settings: AoaSettings, progress: Callable[[str], None] = lambda _: No
             (part, Candidate(drawn, sample_bound(settings, drawn, states), fusion_bound(settings, drawn)))
         )
     progress("how good they must be")
-    return _designed(settings, best, stated, tuple(ranked), tuple(lines))
+    factors = np.geomspace(*_FACTORS, _QUALITIES).tolist()
+    qualities = tuple((each, fusion_bound(_times(settings, each), best.layout)) for each in factors)
+    return _designed(settings, best, stated, tuple(ranked), tuple(lines), qualities)
 
 
 def sample_bound(settings: AoaSettings, layout: Layout, states: tuple[Array, Array, Array]) -> float:
@@ -264,18 +271,16 @@ def _designed(
     stated: Candidate,
     ranked: tuple[Candidate, ...],
     lines: tuple[tuple[float, Candidate], ...],
+    qualities: tuple[tuple[float, float], ...],
 ) -> Designed:
     """The design with its words; how good the sensors must be, where the study wants a u."""
     wanted, noise = settings.goal.theta, settings.noise
     factor, findings = math.nan, []
     words = f"{_words(best.layout)}: u {_deg(best.fusion)} deg, as stated {_deg(stated.fusion)} deg"
     if wanted is not None:
-        factor = _factor(settings, best.layout, wanted)
+        factor = _factor(settings, best.layout, wanted, qualities)
         if math.isnan(factor):
-            left = min(
-                fusion_bound(_times(settings, float(each)), best.layout)
-                for each in np.geomspace(_FACTORS[0], 1.0, 13)
-            )
+            left = min(u for _, u in qualities)
             text = (
                 f"no accelerometers reach the wanted {_deg(wanted)} deg: with perfect ones {_deg(left)} deg are "
                 "left, of positions, gyro and motion: state these better under [prior] and [noise]"
@@ -292,23 +297,25 @@ def _designed(
         "stated": _record(stated),
         "ranked": [_record(each) for each in ranked],
         "base_lines": [{"part": part, **_record(each)} for part, each in lines],
+        "qualities": [{"times": times, "u": _finite(u)} for times, u in qualities],
         "accelerometer": None if math.isnan(factor) else noise.accelerometer * factor,
         "accelerometer_bias": None if math.isnan(factor) else noise.accelerometer_bias * factor,
     }
-    return Designed(best, stated, ranked, lines, factor, words, result, tuple(findings))
+    return Designed(best, stated, ranked, lines, qualities, factor, words, result, tuple(findings))
 
 
-def _factor(settings: AoaSettings, layout: Layout, wanted: float) -> float:
+def _factor(
+    settings: AoaSettings, layout: Layout, wanted: float, qualities: Sequence[tuple[float, float]]
+) -> float:
     """Largest factor on noise and bias of the accelerometers at which the fusion knows the angle as wanted; NaN where
     none does."""
-    factors = np.geomspace(*_FACTORS, 25)
-    reached = [fusion_bound(_times(settings, float(each)), layout) <= wanted for each in factors]
-    if not any(reached):
+    reached = [k for k, (_, u) in enumerate(qualities) if u <= wanted]
+    if not reached:
         return math.nan
-    last = int(np.flatnonzero(reached)[-1])
-    if last == len(factors) - 1:
-        return float(factors[-1])
-    low, high = math.log(factors[last]), math.log(factors[last + 1])
+    last = reached[-1]
+    if last == len(qualities) - 1:
+        return qualities[-1][0]
+    low, high = math.log(qualities[last][0]), math.log(qualities[last + 1][0])
     while high - low > 0.02:
         middle = 0.5 * (low + high)
         if fusion_bound(_times(settings, math.exp(middle)), layout) <= wanted:

@@ -196,6 +196,16 @@ class Limits:
     snap_ratio: float = 1.4
     """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
 
+    square_share: float = 4.0
+    """Square of the rate that a snap leaves free from row to row, times the longest arm, over an accelerometer's noise,
+    at most."""
+
+    snap_excess: float = 0.08
+    """Excess of it over one from which a snap that is ten times as large is taken where it takes as much away."""
+
+    still_rows: int = 2000
+    """Rows of that still model, or as many as there are in 4 s."""
+
     low_pass_order: int = 4
     """Order of the low pass before the fusion."""
 
@@ -217,6 +227,12 @@ class Limits:
 
     motion_power: float = 10.0
     """Spectral density of the gyro over its noise from which it counts as motion."""
+
+    calm_share: float = 0.1
+    """Root mean square of the flexure that is found, over what is usually allowed, up to which less is."""
+
+    calm_level: float = 0.3
+    """Flexure that is allowed then, over the usual one."""
 
     shaking_frequency: float = 4.0
     """Frequency [Hz] of flexure in a wide band."""
@@ -327,6 +343,9 @@ class Limits:
     disagreeing_sigmas: float = 2.0
     """Standard uncertainties by which a coefficient of that fit differs from the study, to be listed."""
 
+    fit_ratio: float = 2.0
+    """Times the u of a bias by the fusion up to which the scale and the axis by a fit to a reference are used."""
+
     reference_creep: float = 1e-5
     """Angle [rad], some seconds of arc, by which a reference may creep in half a second and stand still."""
 
@@ -350,6 +369,9 @@ class Limits:
 
     unseen_scale: float = 0.01
     """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
+
+    unseen_drift: float = 1e-3 * STANDARD_GRAVITY
+    """Drift [m/s^2] of an accelerometer's bias over a stretch that is tried: of a sensor that warms up."""
 
     unseen_sigmas: float = 2.0
     """Standard uncertainties by which it then shifts the angle, to be told."""

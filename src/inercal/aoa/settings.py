@@ -90,11 +90,12 @@ class Noise:
 @dataclass(frozen=True)
 class Resonance:
     """Flexure of the sting: a band-pass of ``frequency`` [rad/s] and relative ``damping``, whose output has the
-    standard deviation ``level`` [m/s^2]."""
+    standard deviation ``level`` [m/s^2]; along the body's axis, or ``vertical`` as of a support that plunges."""
 
     frequency: float
     damping: float
     level: float
+    vertical: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ import numpy as np
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.diagnosis.choice import decided_with, of_delay, of_rectification, of_vibration
+from inercal.aoa.diagnosis.effect import of_flexure
 from inercal.aoa.diagnosis.examination import diagnose, implausible
-from inercal.aoa.diagnosis.unseen import unseen_scale
+from inercal.aoa.diagnosis.unseen import unseen
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
@@ -138,8 +139,9 @@ def measure(
         filtered = filter_result.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
-        findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings)]
-        findings += [*of_delay(delay, of, filtered), *unseen_scale(zeroed, of)]
+        findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings, settings.band.every)]
+        findings += [*of_delay(delay, of, filtered), *unseen(zeroed, of)]
+        findings += of_flexure(zeroed, of, filtered, settings)
         known_u = angles.u[np.isfinite(angles.u)]
         if len(known_u):
             findings += of_rectification(recording, settings, float(np.median(known_u)))

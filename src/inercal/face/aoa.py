@@ -160,15 +160,21 @@ def design(study: Study, progress: Progress = lambda _: None) -> Result:
     designed, result = designed_by("design aoa", study, lambda: search(study.settings, progress), REFERENCES)
 
     def page() -> str:
+        from inercal.aoa.figures import layouts
         from inercal.report.html import render
 
-        return render(result, [picture()], "Sensors of a wind-tunnel model", (), designed.tables())
+        return render(
+            result,
+            layouts.pictures(designed, study.settings),
+            "Sensors of a wind-tunnel model",
+            (),
+            designed.tables(),
+        )
 
     def picture() -> Picture:
-        from inercal.aoa.figures.sensors import side_view
+        from inercal.aoa.figures import layouts
 
-        layout = designed.best.layout
-        return side_view(layout.names, layout.angle, layout.r, layout.z, True)
+        return layouts.best(designed)
 
     def tables() -> list[str]:
         return [f"{table.title}\n{table.text()}" for table in designed.tables()]

@@ -21,16 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-SETTLED = 2.0
-"""Time [s] that a filter is given to settle: what comes before does not count where axes are spanned."""
-
-
-def settled(t: Array) -> NDArray[np.bool_]:
-    """Rows (n,) later than the first 2 s; all of a shorter record."""
-    late = t - t[0] >= SETTLED
-    return late if late.any() else np.ones(len(t), dtype=bool)
-
-
 def known(x: Array) -> Array:
     """The finite values."""
     return x[np.isfinite(x)]
@@ -93,12 +83,14 @@ class Panel:
 @dataclass(frozen=True, eq=False)
 class Marks:
     """Marks along the time [s]: stretches (k, 2) in which samples were ``saturated``, in which there are none,
-    ``gaps``, and in which the model was ``moving``; times (k,) at which an estimator started anew, ``restarts``."""
+    ``gaps``, and in which the model was ``moving``; times (k,) at which an estimator started anew, ``restarts``. What
+    comes in the first ``settling`` [s], or tenth, does not count where axes are spanned."""
 
     saturated: Array = field(default_factory=lambda: np.empty((0, 2)))
     gaps: Array = field(default_factory=lambda: np.empty((0, 2)))
     moving: Array = field(default_factory=lambda: np.empty((0, 2)))
     restarts: Array = field(default_factory=lambda: np.empty(0))
+    settling: float = 0.0
 
     @property
     def words(self) -> str:
@@ -144,12 +136,12 @@ def over_time(
     marks: Marks | None = None,
     height: float = 0.95,
 ) -> Picture:
-    """Panels above each other over ``t`` (n,) [s], increasing; the y axes span what comes after the first 2 s."""
+    """Panels above each other over ``t`` (n,) [s], increasing; the y axes span what comes after the settling."""
     marks = Marks() if marks is None else marks
     if len(t) < 2:
         t, panels = np.array([0.0, 1.0]), [replace(each, lines={}, band=None) for each in panels]
     cuts, pieces = np.searchsorted(t, marks.gaps[:, 1]), max(_FEWEST, min(_PIECES, _IN_ALL // len(panels)))
-    late = t - t[0] >= min(SETTLED, 0.1 * float(t[-1] - t[0]))
+    late = t - t[0] >= min(marks.settling, 0.1 * float(t[-1] - t[0]))
     with grid(t, len(panels), 1, height, 0.27) as (page, axes, places):
         for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
             cell = replace(place, y=_limits(panel, late), scale=panel.scale)

@@ -4,11 +4,13 @@ The causal fusion of `inercal.aoa` goes on by one row at a time, to the digits t
 answers each row with one line: the first ones, and those after the angle was lost, are held until the filter can start
 (`inercal.aoa.fusion.live`). `inercal.aoa.reading.from_record` calibrates the sensors, and samples at a range are left
 out. A stream does not see faults that only a whole recording shows: sensors that are flat at an extreme below their
-range, or stuck, and a model that moves in the stretch of the study's zero.
+range, or stuck.
 
 Delay, band and snap that the study does not state are decided after `Limits.snap_time`
 (`inercal.aoa.diagnosis.choice`): the fusion begins anew with them, on all rows so far, and from then on the digits are
-those of a study that states them; each line has the status 1 until then. Angles beyond the study's limits are said as
+those of a study that states them; each line has the status 1 until then. Likewise the study's zero is put in once its
+stretch is over, as in a file: a slight buffet in it is averaged, and one in which the model moves is said and left out.
+Angles beyond the study's limits are said as
 they come.
 """
 
@@ -31,7 +33,7 @@ from inercal.aoa.fusion.watch import initial as unwatched
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later as later_rows
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.reading.wind_off_zero import angle_at
+from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
 from inercal.aoa.result.columns import SUSPECT, columns, rows
@@ -39,7 +41,8 @@ from inercal.aoa.result.systematic import gravity_u, leaning, leans, widened
 from inercal.aoa.result.verdict import nis_limit
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.findings import Finding
+from inercal.errors import RecordError
+from inercal.findings import EVERYTHING, Finding
 from inercal.stream.aoa_sensors import Sensors, watched_limits
 from inercal.stream.aoa_state import AoaState, Leaning, choice_of, chosen, kept
 from inercal.stream.lines import Lines, Sample
@@ -136,7 +139,7 @@ class Aoa:
             },
             t=-math.inf, begun=math.nan, temperature=math.nan, heard=math.nan, beyond=math.nan, watch=unwatched(),
             unanswered=0, rows=0, head=np.empty((64, self._problem.count + BESIDE + 1)), seen=0, choice=np.empty(0),
-            remarked=False, alarms=Alarms(), slots=Slots(),
+            zeroed=self._settings.zero is None, remarked=False, alarms=Alarms(), slots=Slots(),
         )  # fmt: skip
 
     def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
@@ -150,26 +153,24 @@ class Aoa:
         for k, text in saturated:
             state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
         n = self._problem.count
-        later = sample.t > state.t
-        zero_angle = (math.nan, math.nan)
         gyro, roll, yaw = values[n:].tolist()
-        if later:
-            zero_angle = self._zero(state, sample.t, values[:n])
+        if sample.t > state.t:
             state = self._heard(state, sample.t, gyro)
-        if later:
             begun = sample.t if math.isnan(state.begun) else state.begun
             state = state._replace(t=sample.t, begun=begun)
-        read = (sample.t, values[:n], gyro, roll, yaw, *zero_angle)
-        if self._waits(state):
-            state = kept(state, np.array([sample.t, *values[:n], gyro, *zero_angle, roll, yaw]))
+        readings = np.array([*values[:n], gyro, math.nan, math.nan, roll, yaw])
+        if self._waits(state) or not state.zeroed:
+            state = kept(state, np.concatenate([[sample.t], readings]))
         if self._needs_rate and not state.choice.size:
             state, answers, turned = self._rated(state)
         else:
-            answers = self._live.feed(*read)
-            turned = [each.feed(*read).angles.theta for each in self._others]
+            answers = self._live.feed(sample.t, readings)
+            turned = [each.feed(sample.t, readings).angles.theta for each in self._others]
         state, outputs = self._lines(state._replace(live=self._live.state), answers, self._others, turned)
-        if self._waits(state) and state.t - state.begun >= LIMITS.snap_time:
-            state = self._decided(state)
+        decides = self._waits(state) and not self._stated and state.t - state.begun >= LIMITS.snap_time
+        zero = None if state.zeroed else self._settings.zero
+        if decides or (zero is not None and state.t > zero.end):
+            state = self._again(state, decides)
         self._after = state
         return state, outputs
 
@@ -203,10 +204,14 @@ class Aoa:
 
     def _waits(self, state: AoaState) -> bool:
         """True as long as rows are kept: the rate is not known, or a choice not made."""
-        stated = self._settings.band.low_pass is not None and self._settings.estimator.snap is not None
-        if stated:
+        if self._stated:
             return self._needs_rate and not state.choice.size
         return not (state.choice.size and state.choice[0])
+
+    @property
+    def _stated(self) -> bool:
+        """True where the study states all that a stream would decide."""
+        return self._settings.band.low_pass is not None and self._settings.estimator.snap is not None
 
     def _rated(self, state: AoaState, last: bool = False) -> tuple[AoaState, Answers, list[Array]]:
         """The state once the rate of rows is known, for the study's band, and answers for the rows until then."""
@@ -221,15 +226,22 @@ class Aoa:
         answers = self._live.feed_rows(head)
         return state, answers, [each.feed_rows(head).angles.theta for each in self._others]
 
-    def _decided(self, state: AoaState) -> AoaState:
-        """The state once delay, band and snap are decided: the fusion has gone over all rows so far with them."""
-        head, n = state.head[: state.seen], self._problem.count
+    def _again(self, state: AoaState, decides: bool) -> AoaState:
+        """The state after the fusion has gone over all rows so far once more: with delay, band and snap where it
+        ``decides`` on them, and with the zero where that is over."""
+        head, n = state.head[: state.seen].copy(), self._problem.count
         recording = Recording(
             head[:, 0], head[:, 1 : n + 1], head[:, n + 1], head[:, n + 4 :], head[:, n + 2 : n + 4]
         )
-        settings = decided(recording, self._settings)
-        for finding in of_vibration(self._settings, settings):
-            self._say(finding)
+        settings = chosen(self._settings, state.choice) if state.choice.size else self._settings
+        if decides:
+            settings = decided(recording, self._settings)
+            for finding in of_vibration(self._settings, settings):
+                self._say(finding)
+            state = state._replace(choice=choice_of(settings, final=True))
+        if settings.zero is not None and state.t > settings.zero.end:
+            head[:, n + 2 : n + 4] = self._zeroed(recording, settings)
+            state = state._replace(zeroed=True)
         self._pose(settings)
         answers = self._live.feed_rows(head)
         state, _ = self._judged(state._replace(watch=unwatched()), answers)
@@ -237,10 +249,22 @@ class Aoa:
         for each, other in zip(self._changes, self._others, strict=True):
             other.feed_rows(head)
             beside[each.name] = Leaning(other.state, np.empty(0))
-        none = np.empty((64, head.shape[1]))
-        return state._replace(
-            live=self._live.state, beside=beside, head=none, seen=0, choice=choice_of(settings, final=True)
-        )
+        state = state._replace(live=self._live.state, beside=beside)
+        if self._waits(state) or not state.zeroed:
+            return state
+        return state._replace(head=np.empty((64, head.shape[1])), seen=0)
+
+    def _zeroed(self, recording: Recording, settings: AoaSettings) -> Array:
+        """Angles (k, 2) that the zero states for the rows of a recording, none where the model moves in its stretch;
+        either is said."""
+        try:
+            zeroed = with_zero(recording, settings)
+        except RecordError as error:
+            self._say(Finding("not_at_rest", f"the zero is left out: {error}", harm=EVERYTHING))
+            return recording.zero_angle
+        for finding in zeroed.findings:
+            self._say(finding)
+        return zeroed.zero_angle
 
     def _go_on_from(self, state: AoaState) -> None:
         """Go on with the fusion, and those under changes, as a state left them."""
@@ -256,13 +280,6 @@ class Aoa:
         for finding in self._sensors.remarks:
             self._say(finding)
         return state._replace(remarked=True)
-
-    def _zero(self, state: AoaState, t: float, acc: Array) -> tuple[float, float]:
-        """The angle that is stated for a row, and its standard uncertainty [rad]; NaN where there is none."""
-        zero = self._settings.zero
-        if zero is None or not np.isfinite(acc).all():
-            return math.nan, math.nan
-        return angle_at(zero, t, state.t)
 
     def _heard(self, state: AoaState, t: float, gyro: float) -> AoaState:
         """The state with the last row of the gyro, or an alarm where it is silent."""

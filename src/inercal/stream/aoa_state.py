@@ -30,9 +30,9 @@ class AoaState(NamedTuple):
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
     last row with a number of the gyro, ``beyond`` [s] the last one with an angle beyond the limits (NaN before).
     ``watch`` is that of `inercal.aoa.fusion.watch`; of all ``rows`` that were answered ``unanswered`` have no angle.
-    ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided; ``choice``
-    is that (`choice_of`), empty before. ``remarked``: the findings on the sensors were given; ``slots`` that of the
-    last line.
+    ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided and the zero
+    is over; ``choice`` is that (`choice_of`), empty before, ``zeroed``: the zero was put in. ``remarked``: the findings
+    on the sensors were given; ``slots`` that of the last line.
     """
 
     live: LimitedState
@@ -48,6 +48,7 @@ class AoaState(NamedTuple):
     head: Array
     seen: int
     choice: Array
+    zeroed: bool
     remarked: bool
     alarms: Alarms
     slots: Slots
@@ -64,23 +65,28 @@ def kept(state: AoaState, row: Array) -> AoaState:
 
 def choice_of(settings: AoaSettings, final: bool) -> Array:
     """All that was decided, as numbers of a state: 1 where ``final``, 0 for the rate alone; rate, low pass, snap (0 for
-    the usual one), delay and the prior of its rest, flexure, rectified vibration, notches."""
+    the usual one), delay and the prior of its rest, flexure in both directions, rectified vibration, notches."""
     band, snap = settings.band, settings.estimator.snap or 0.0
     low = math.nan if band.low_pass is None else band.low_pass
     delay = settings.timing.gyro_delay_about, settings.prior.gyro_delay
-    flexure = settings.prior.heave
-    shaken = flexure.frequency, flexure.damping, flexure.level
+    shaken = [
+        float(each)
+        for of in (settings.prior.heave, settings.prior.axial)
+        for each in (of.frequency, of.damping, of.level, of.vertical)
+    ]
     rectified = settings.prior.rectified
     return np.array([float(final), band.rate, low, snap, *delay, *shaken, rectified, *band.notch])
 
 
 def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
     """The study with what was decided."""
-    _, rate, low, snap, about, rest, frequency, damping, level, rectified, *notch = choice.tolist()
-    prior = replace(settings.prior, gyro_delay=rest, rectified=rectified)
-    heave = Resonance(frequency, damping, level)
-    if heave != prior.heave:
-        prior = replace(prior, heave=heave, axial=heave)
+    _, rate, low, snap, about, rest, *numbers = choice.tolist()
+    heave, axial = (
+        Resonance(frequency, damping, level, bool(vertical))
+        for frequency, damping, level, vertical in (numbers[:4], numbers[4:8])
+    )
+    rectified, *notch = numbers[8:]
+    prior = replace(settings.prior, gyro_delay=rest, rectified=rectified, heave=heave, axial=axial)
     return replace(
         settings,
         band=Band(None if math.isnan(low) else low, tuple(notch), rate),

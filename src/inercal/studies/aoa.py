@@ -121,11 +121,19 @@ class FlexureTable(Strict):
     )
 
 
+class HeaveTable(FlexureTable):
+    """The first of both resonances, across the model or along the vertical."""
+
+    direction: Literal["z", "vertical"] = Field(
+        default="z", description="across the model, or vertical, as of a support that plunges"
+    )
+
+
 class SensorPriorTable(table_of(Prior)):  # type: ignore[misc]
     """Standard deviations of the sensors' errors before the run; the usual ones if absent."""
 
-    heave: FlexureTable = Field(
-        default=FlexureTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
+    heave: HeaveTable = Field(
+        default=HeaveTable(), title="Heave", description="flexure along z: 9 Hz, damping 0.3 if absent"
     )
     axial: FlexureTable = Field(
         default=FlexureTable(), title="Axial", description="flexure along x: 12 Hz, damping 0.5 if absent"
@@ -320,6 +328,7 @@ def _flexure(table: FlexureTable, usual: Resonance) -> Resonance:
         usual.frequency if table.frequency is None else 2.0 * math.pi * table.frequency.value,
         usual.damping if table.damping is None else table.damping.value,
         usual.level if table.level is None else table.level.value,
+        isinstance(table, HeaveTable) and table.direction == "vertical",
     )
 
 

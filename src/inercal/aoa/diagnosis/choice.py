@@ -2,7 +2,8 @@
 
 The delay is that of the spectra, and the filter may learn what is left of it. Band and snap are judged by the
 innovations: taken is the widest band, and in it the smallest density of snap, under which innovations are nearly as
-small as those of a still model with the study's noise. So calm recordings keep all of their band and the usual snap.
+small as those of a still model with the study's noise, and a livelier model would not fit better than it does there.
+So calm recordings keep all of their band and the usual snap. Lines come out before a larger snap is tried.
 Under too small a snap a buffet is taken for errors of positions and scale; under too large a one noise is taken for
 motion, and these errors are learned from it. Vibration that is no rotation fits under no snap: lines and what lies
 above the model's motion are taken out of all sensors alike.
@@ -11,8 +12,10 @@ above the model's motion are taken out of all sensors alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +33,7 @@ from inercal.aoa.paper.delay import Delay, relative_delay
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior, Resonance
+from inercal.arrays import Array
 from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
@@ -37,7 +41,7 @@ DENSITIES = (1e9, 1e10, 1e11, 1e12)
 """Densities [rad^2/s^7] beyond the usual one."""
 
 SHAKING = (0.03 * STANDARD_GRAVITY, 0.1 * STANDARD_GRAVITY)
-"""Levels [m/s^2] of flexure in a wide band that are tried beyond the usual one."""
+"""Levels [m/s^2] of flexure in a wide band that are tried beyond the usual one, of a plunge before both directions."""
 
 LOW_PASSES = (100.0, 70.0, 50.0, 35.0)
 """Corners [Hz] of the low passes that are tried, the widest first."""
@@ -60,33 +64,130 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     if stated and settings.estimator.snap is not None:
         return settings
     settings = _with_delay(delay, _with_offsets(recording, settings))
+    densities = _densities(settings)
+    settings = _with_snap(settings, densities[0])
     plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
     stretches = [_part(recording, rows) for rows in _liveliest(recording)]
     if not stretches:
         return plain
-    usual, fixed = settings.estimator.density, settings.estimator.snap is not None
-    densities = (usual,) if fixed else (usual, *DENSITIES)
     fair = _fair(stretches[0], settings)
     bands = (plain.band, *(() if stated else _bands(stretches[0], fair)))
+    # lines first: a snap that is large enough may take pick-up for motion
+    attempts = [(each, 1) for each in bands if not each.corner < math.inf]
+    attempts += [(each, len(densities)) for each in bands]
     # flexure last: what a wide one allows for is much, and u with it
     for prior in (settings.prior, *_shaken(settings.prior)):
-        for band in bands:
+        for band, most in attempts:
             tried = replace(fair, band=band, prior=prior)
-            limit = LIMITS.snap_ratio * _still(recording, tried)
-            for density in densities:
-                of = problem(_with_snap(tried, density), recording.spatial)
-                if all(_nis(of, part) < limit for part in stretches):
-                    return _with_snap(replace(settings, band=band, prior=prior), density)
+            if (density := _density(recording, stretches, tried, densities, most)) is not None:
+                fitting = _with_snap(replace(settings, band=band, prior=prior), density)
+                # under the liveliest model nothing is left to tell flexure by
+                lively = density == DENSITIES[-1]
+                return fitting if lively else _calmer(stretches, settings.prior, fitting)
     return plain
 
 
-def _shaken(prior: Prior) -> Iterator[Prior]:
-    """Priors by which the support shakes the model more, in a wide band; none where flexure is stated."""
+def _densities(settings: AoaSettings) -> tuple[float, ...]:
+    """Densities of snap that are tried, the smallest first: the stated one, or the usual one and larger ones.
+
+    At low rates the usual one would leave the rate w so free from row to row, by q dt^5 / 20, that the square of this
+    in r w^2 is more than noise, which no linear filter allows for: there they begin with a smaller one.
+    """
+    usual, arm = settings.estimator.density, float(np.abs(settings.layout.r).max())
+    if settings.estimator.snap is not None:
+        return (usual,)
+    if not (settings.band.rate > 0.0 and arm > 0.0):
+        return (usual, *DENSITIES)
+    free = LIMITS.square_share * settings.noise.accelerometer / arm
+    least = 20.0 * free * settings.band.rate**5
+    if least >= usual:
+        return (usual, *DENSITIES)
+    steps = math.ceil(math.log10(DENSITIES[-1] / least))
+    return tuple(least * 10.0**k for k in range(steps))
+
+
+def _density(
+    recording: Recording,
+    stretches: Sequence[Recording],
+    tried: AoaSettings,
+    densities: Sequence[float],
+    most: int,
+) -> float | None:
+    """The smallest of the first ``most`` densities under which all stretches fit, and which a larger one does not
+    better; None of none."""
+    limit = LIMITS.snap_ratio * _still(recording, tried)
+
+    @cache
+    def largest(density: float) -> float:
+        of, worst = problem(_with_snap(tried, density), recording.spatial), 0.0
+        for part in stretches:
+            worst = max(worst, _nis(of, part))
+            if not worst < limit:  # the others would not make it better
+                return math.inf
+        return worst
+
+    def excess(density: float) -> float:
+        return largest(density) / _still(recording, _with_snap(tried, density)) - 1.0
+
+    for density, livelier in islice(pairwise((*densities, None)), most):
+        assert density is not None
+        if not largest(density) < limit:
+            continue
+        if livelier is None or (own := excess(density)) < LIMITS.snap_excess:
+            return density
+        if own - excess(livelier) < LIMITS.snap_excess:
+            return density
+    return None
+
+
+def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings) -> AoaSettings:
+    """The study with less flexure in each direction in which the fusion finds a tenth of the usual at most, in all
+    stretches, and the ``stated`` prior is the usual one: what is allowed for and is not there costs u, most at rest."""
+    usual, prior = Prior(), settings.prior
+    if not _usual_flexure(stated) or settings.estimator.states < 15:
+        return settings
+    found = np.max([_flexure(part, settings) for part in stretches], axis=0)
+    calm = [
+        each == before and rms < LIMITS.calm_share * each.level
+        for each, before, rms in zip(
+            (prior.heave, prior.axial), (usual.heave, usual.axial), found.tolist(), strict=True
+        )
+    ]
+    heave, axial = (
+        replace(each, level=LIMITS.calm_level * each.level) if less else each
+        for each, less in zip((prior.heave, prior.axial), calm, strict=True)
+    )
+    return replace(settings, prior=replace(prior, heave=heave, axial=axial))
+
+
+def _flexure(part: Recording, settings: AoaSettings) -> Array:
+    """Rms (2,) [m/s^2] of the flexure along z and x that the fusion of a stretch finds; infinite where none runs."""
+    part, of = limiting.fused(part, problem(settings, part.spatial))
+    kept, at = np.full((len(part.t), 2 * of.size), np.nan), of.places.resonators
+    advance(initial(of), of, part.t, part.rows, kept, last=True)
+    found = kept[part.t - part.t[:1] >= LIMITS.settling_time][:, [at + 1, at + 3]]
+    found = found[np.isfinite(found).all(axis=1)]
+    return np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else np.full(2, np.inf)
+
+
+def _usual_flexure(prior: Prior) -> bool:
+    """True where the study does not state flexure."""
     usual = Prior()
-    if (prior.heave, prior.axial) == (usual.heave, usual.axial):
+    return (prior.heave, prior.axial) == (usual.heave, usual.axial)
+
+
+def _shaken(prior: Prior) -> Iterator[Prior]:
+    """Priors by which the support shakes the model more, in a wide band; none where flexure is stated.
+
+    A plunge comes first: it changes the size of gravity and not its direction, and costs hardly any u.
+    """
+    if not _usual_flexure(prior):
+        return
+    frequency = 2.0 * math.pi * LIMITS.shaking_frequency
+    for vertical in (True, False):
         for level in SHAKING:
-            wide = Resonance(2.0 * math.pi * LIMITS.shaking_frequency, LIMITS.shaking_damping, level)
-            yield replace(prior, heave=wide, axial=wide)
+            wide = Resonance(frequency, LIMITS.shaking_damping, level, vertical)
+            yield replace(prior, heave=wide, axial=prior.axial if vertical else wide)
 
 
 def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
@@ -99,12 +200,16 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
             f"without it: to have the same band again write {band.words} under [band]"
         )
         findings.append(Finding("band_limited", text))
-    if flexure != settings.prior.heave:
+    if flexure.frequency != settings.prior.heave.frequency:
         text = (
-            "the support shakes the model beyond its usual flexure, as by a plunge, and u allows for it: to have the "
-            f'same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", damping = '
-            f'"{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g" under [prior.heave] and '
-            "[prior.axial]"
+            f"the support {'plunges' if flexure.vertical else 'shakes the model beyond its usual flexure'}, and u "
+            f'allows for it: to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
+            f'damping = "{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g"'
+            + (
+                ', direction = "vertical" under [prior.heave]'
+                if flexure.vertical
+                else " under [prior.heave] and [prior.axial]"
+            )
         )
         findings.append(Finding("wide_flexure", text))
     return findings
@@ -272,7 +377,8 @@ def _nis(of: FilterProblem, part: Recording) -> float:
 def _still(recording: Recording, settings: AoaSettings) -> float:
     """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
     step = float(np.median(np.diff(recording.t[later(recording.t)])))
-    t = step * np.arange(round(2.0 * LIMITS.settling_time / step), dtype=float)
+    lasting = max(2.0 * LIMITS.settling_time, min(LIMITS.snap_time, LIMITS.still_rows * step))
+    t = step * np.arange(round(lasting / step), dtype=float)
     layout, rng = settings.layout, np.random.default_rng(0)
     up = settings.site.gravity * settings.attitude.level
     acc = np.tile(-up * np.sin(layout.angle), (len(t), 1))

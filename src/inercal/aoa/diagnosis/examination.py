@@ -20,10 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.aoa.diagnosis.effect import of_noise
 from inercal.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, stretch
 from inercal.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults
 from inercal.aoa.diagnosis.noise_check import misstated
 from inercal.aoa.diagnosis.small import small_errors
+from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
@@ -145,17 +147,20 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
 
 
 def diagnose(
-    recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None
+    recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None, every: int = 1
 ) -> list[Finding]:
     """Name the faults of a recording; none for a sound one, nor for one with gross faults.
 
-    ``gross`` are the findings of `implausible`, where they are known already.
+    ``gross`` are the findings of `implausible`, where they are known already; one of ``every`` rows of the sensors is
+    a row of the recording, as after a band.
 
     Codes are ``excess_scatter``, ``low_scatter``, ``unmodelled``, ``site_suspect``, ``prior_suspect`` and, where no one
     error explains what the sensors say, ``contradiction``.
     """
     part = stretch(recording)
-    noise, fair = misstated(part, settings)
+    noise, fair = misstated(part, settings, every)
+    plain, other = (problem(each, part.spatial) for each in (settings, fair))
+    noise = of_noise(part, plain, other, noise)
     now = fit_quality(part, fair)
     if now.misfit > LIMITS.sound_misfit and (implausible(recording, settings) if gross is None else gross):
         return []

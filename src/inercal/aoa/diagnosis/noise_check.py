@@ -60,8 +60,13 @@ def _by_order(t: Array, values: Array) -> list[float] | None:
     return sizes
 
 
-def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding], AoaSettings]:
-    """``excess_scatter`` and ``low_scatter``: noise unlike the study's; and the study with noise not too small."""
+def misstated(
+    recording: Recording, settings: AoaSettings, every: int = 1
+) -> tuple[list[Finding], AoaSettings]:
+    """``excess_scatter`` and ``low_scatter``: noise unlike the study's; and the study with noise not too small.
+
+    A row of the recording stands for ``every`` rows of the sensors, for which the findings state noise.
+    """
     noise, names = settings.noise, settings.layout.names
     columns = {name: recording.acc[:, k] for k, name in enumerate(names)}
     groups = (("accelerometer", columns, noise.accelerometer), ("gyro", {"gyro": recording.gyro}, noise.gyro))
@@ -74,10 +79,10 @@ def misstated(recording: Recording, settings: AoaSettings) -> tuple[list[Finding
         least = max((max(each.size, each.sparse) / nominal for each in noisy.values()), default=0.0)
         if loud := [name for name, ratio in over.items() if ratio > LIMITS.loud_noise_ratio]:
             most = max(over.values())
-            findings.append(_finding("excess_scatter", key, loud, most, nominal))
+            findings.append(_finding("excess_scatter", key, loud, most, nominal * math.sqrt(every)))
             settings = replace(settings, noise=replace(settings.noise, **{key: most * nominal}))
         elif LIMITS.no_noise_ratio < least < LIMITS.low_noise_ratio:
-            findings.append(_finding("low_scatter", key, list(noisy), least, nominal))
+            findings.append(_finding("low_scatter", key, list(noisy), least, nominal * math.sqrt(every)))
     return findings, settings
 
 

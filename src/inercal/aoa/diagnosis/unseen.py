@@ -1,8 +1,8 @@
 """Faults that nothing in a recording would show, with what they would cost: told, for u has them only as the prior has.
 
 Under one sine a gyro's scale that is wrong looks as a motion that is larger by as much, with heights and positions that
-fit it: the innovations stay small, and the angle is off. Whether that is so depends on the motion, so it is tried, on a
-stretch of the recording.
+fit it; a bias that drifts looks as an angle that does. The innovations stay small, and the angle is off. Whether that
+is so depends on the motion, so it is tried, on a stretch of the recording.
 """
 
 from __future__ import annotations
@@ -12,32 +12,64 @@ from dataclasses import replace
 
 import numpy as np
 
+from inercal.aoa.diagnosis.effect import Effect, effect
 from inercal.aoa.diagnosis.fit_quality import stretch
-from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.findings import Finding
-from inercal.geometry.rotations import principal
+from inercal.units import STANDARD_GRAVITY
 
 
-def unseen_scale(recording: Recording, problem: FilterProblem) -> list[Finding]:
-    """``weak_test``: a gyro's scale off by `Limits.unseen_scale` would shift the angle by over twice u, unnoticed."""
+def unseen(recording: Recording, problem: FilterProblem) -> list[Finding]:
+    """``weak_test``: what would shift the angle by over twice u, unnoticed: a gyro's scale that is off by
+    `Limits.unseen_scale`, and a bias that drifts by `Limits.unseen_drift` where no random walk is stated."""
     part = stretch(recording)
-    if not np.isfinite(part.gyro).any():
-        return []
     plain = estimate(part, problem)
-    off = estimate(replace(part, gyro=(1.0 + LIMITS.unseen_scale) * part.gyro), problem)
-    known = np.isfinite(plain.u) & np.isfinite(off.theta) & (part.t - part.t[:1] >= LIMITS.settling_time)
-    if not known.any() or off.nis_mean > LIMITS.mean_nis:
-        return []
-    shift = float(np.sqrt(np.mean(np.square(principal(off.theta - plain.theta)[known]))))
-    ratio = shift / float(np.median(plain.u[known]))
-    if not ratio > LIMITS.unseen_sigmas:
+    return [*_scale(part, problem, plain), *_drift(part, problem, plain)]
+
+
+def _told(part: Recording, off: Recording, problem: FilterProblem, plain: FilterResult) -> Effect | None:
+    """The effect of a fault in a stretch; None where it is small, or noticed."""
+    found = effect(plain, estimate(off, problem), part.t)
+    if found is None or found.nis > LIMITS.mean_nis or not found.ratio > LIMITS.unseen_sigmas:
+        return None
+    return found
+
+
+def _scale(part: Recording, problem: FilterProblem, plain: FilterResult) -> list[Finding]:
+    """The gyro's scale."""
+    off = replace(part, gyro=(1.0 + LIMITS.unseen_scale) * part.gyro)
+    if not np.isfinite(part.gyro).any() or (found := _told(part, off, problem, plain)) is None:
         return []
     text = (
         f"nothing in this motion would show a gyro whose scale is off by {100.0 * LIMITS.unseen_scale:g} %, which "
-        f"shifts the angle by {math.degrees(shift):.2g} deg, {ratio:.2g} times u: verify it, or state a wider "
-        "gyro_scale under [prior]"
+        f"shifts the angle by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u: verify it, or state a "
+        "wider gyro_scale under [prior]"
+    )
+    return [Finding("weak_test", text)]
+
+
+def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list[Finding]:
+    """The bias of the accelerometer whose drift shifts the angle most."""
+    if problem.constants.accelerometer_walk > 0.0 or len(part.t) < 2:
+        return []
+    course = LIMITS.unseen_drift * (part.t - part.t[0]) / (part.t[-1] - part.t[0])
+    worst: tuple[float, str, Effect] | None = None
+    for k, name in enumerate(problem.layout.names):
+        acc = part.acc.copy()
+        acc[:, k] += course
+        found = _told(part, replace(part, acc=acc), problem, plain)
+        if found is not None and (worst is None or found.shift > worst[0]):
+            worst = found.shift, name, found
+    if worst is None:
+        return []
+    shift, name, found = worst
+    drift = 1e3 * LIMITS.unseen_drift / STANDARD_GRAVITY
+    text = (
+        f"nothing in this motion would show a bias of {name} that drifts by {drift:g} mg, which shifts the "
+        f"angle by {math.degrees(shift):.2g} deg, {found.ratio:.2g} times u: state accelerometer_walk under [noise] "
+        "where it may"
     )
     return [Finding("weak_test", text)]

@@ -13,6 +13,7 @@ from inercal.aoa.angles import gives_alpha
 from inercal.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
 from inercal.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import settled
 from inercal.aoa.reading.pauses import at_rest
 from inercal.aoa.result.tables import answer, delays, displayed, on_page
 from inercal.aoa.task import in_order
@@ -21,7 +22,6 @@ from inercal.geometry.rotations import principal
 from inercal.report.coefficients import correlation
 from inercal.report.html import Picture, render
 from inercal.report.over_time import (
-    SETTLED,
     Flags,
     Marks,
     Panel,
@@ -32,7 +32,6 @@ from inercal.report.over_time import (
     middle,
     over_time,
     rms,
-    settled,
     span,
     stretches,
 )
@@ -113,7 +112,12 @@ def _marks(seen: Measurement) -> Marks:
     """Stretches that are saturated or empty, and where the filter started anew."""
     t, (_, masked) = seen.recording.t, _lost(seen.recording)
     restarts = np.empty(0) if seen.filtered is None else t[list(seen.filtered.starts[1:])]
-    return Marks(stretches(t, np.asarray(masked.any(axis=1))), gaps(t), restarts=restarts)
+    return Marks(
+        stretches(t, np.asarray(masked.any(axis=1))),
+        gaps(t),
+        restarts=restarts,
+        settling=LIMITS.settling_time,
+    )
 
 
 def _angle(seen: Measurement, marks: Marks) -> Picture:
@@ -146,7 +150,7 @@ def _close_up(seen: Measurement) -> list[Picture]:
     t, angles = seen.recording.t, seen.angles
     if not t[-1] - t[0] > 4.0 * _CLOSE or not np.isfinite(angles.theta).any():
         return []
-    place = np.floor((t - t[0] - SETTLED) / _CLOSE)
+    place = np.floor((t - t[0] - LIMITS.settling_time) / _CLOSE)
     edges = np.flatnonzero((np.diff(place, prepend=-1.0) > 0.0) & (place >= 0.0))
     theta = np.degrees(angles.theta)
     spans = [float(np.ptp(known(theta[a:b]))) if len(known(theta[a:b])) else 0.0 for a, b in pairwise(edges)]

@@ -12,13 +12,14 @@ import numpy as np
 from inercal.aoa.figures import sensors
 from inercal.aoa.layout import all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.clock import settled
 from inercal.aoa.result.outcome import term_of
 from inercal.arrays import Array
 from inercal.instruments.terms import shown_unit
 from inercal.report import innovations as white_noise
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
-from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms, settled
+from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -77,7 +78,10 @@ def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, ma
     if "flexure_z" not in names or len(filtered.kept_t) < 2:
         return []
     panels = []
-    for axis, word, of in (("z", "across", prior.heave), ("x", "along", prior.axial)):
+    for axis, word, of in (
+        ("z", "along the vertical with" if prior.heave.vertical else "across", prior.heave),
+        ("x", "along", prior.axial),
+    ):
         k = names.index(f"flexure_{axis}")
         value, u, level = filtered.states[:, k] / _MG, filtered.states_u[:, k] / _MG, 2.0 * of.level / _MG
         title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"
@@ -88,8 +92,8 @@ def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, ma
             "Flexure of the sting",
             "Specific force of the model's vibration on its sting, as the fusion estimates it beside the pitch, with "
             "bands of ± two standard uncertainties; dashes: ± two standard deviations of the prior. Within its band "
-            "there is none to be seen. Beyond the dashes the prior is too small, and so is the uncertainty of theta; "
-            f"even where they hold it can be too small by some 20 % while the sting vibrates.{marks.words}",
+            "there is none to be seen. Beyond the dashes the prior is too small, and so may be the uncertainty of "
+            f"theta: the finding flexure says by how much.{marks.words}",
             filtered.kept_t,
             panels,
             marks,

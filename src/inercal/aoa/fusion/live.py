@@ -7,7 +7,6 @@ held again: their angles then come all at once. A row that is not later than tho
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -67,8 +66,8 @@ class Live:
     Examples
     --------
     >>> live = Live(problem(settings))
-    >>> for t, acceleration, gyro in samples:
-    ...     answers = live.feed(t, acceleration, gyro)
+    >>> for t, readings in zip(recording.t, recording.rows):
+    ...     answers = live.feed(t, readings)
     """
 
     def __init__(self, problem: FilterProblem, state: LiveState | None = None, where: object = "t") -> None:
@@ -91,24 +90,15 @@ class Live:
     def feed(
         self,
         t: float,
-        acceleration: Array,
-        gyro: float = math.nan,
-        roll: float = math.nan,
-        yaw: float = math.nan,
-        zero_angle: float = math.nan,
-        zero_angle_u: float = math.nan,
+        readings: Array,
     ) -> Answers:
         """Go on by one sample at ``t`` [s]; answers for it: none while rows are held, then those of all held rows.
 
-        ``acceleration`` (N,) [m/s^2] in the order of the layout; ``gyro``, ``roll``, ``yaw`` [rad/s] nose-up, about x,
-        about z; ``zero_angle`` [rad] known from elsewhere, and its standard uncertainty. NaN where missing or
+        ``readings`` (N + 5,) are a row of `inercal.aoa.reading.recording.Recording.rows`, NaN where missing or
         saturated. Raises `RecordError` where time does not go on.
         """
-        problem, state, row, n = self._problem, self._fusion, self._row, self._problem.count
-        row[0, :n] = acceleration
-        row[0, n], row[0, n + 1], row[0, n + 2], row[0, n + 3], row[0, n + 4] = (
-            gyro, zero_angle, zero_angle_u, roll, yaw,
-        )  # fmt: skip
+        problem, state, row = self._problem, self._fusion, self._row
+        row[0] = readings
         if not (state.started and t > state.t):
             return self._block(np.array([t]), row.copy())
         self._dt[0] = t - state.t

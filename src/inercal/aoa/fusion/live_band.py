@@ -62,20 +62,11 @@ class LimitedLive:
         """The state now, in arrays of its own."""
         return _apart(self._state._replace(fusion=self._live.state))
 
-    def feed(
-        self,
-        t: float,
-        acceleration: Array,
-        gyro: float = math.nan,
-        roll: float = math.nan,
-        yaw: float = math.nan,
-        zero_angle: float = math.nan,
-        zero_angle_u: float = math.nan,
-    ) -> Answers:
+    def feed(self, t: float, readings: Array) -> Answers:
         """Go on by one sample, as `Live.feed` does."""
         if self._filter is None:
-            return self._live.feed(t, acceleration, gyro, roll, yaw, zero_angle, zero_angle_u)
-        return self.feed_rows(np.array([[t, *acceleration, gyro, zero_angle, zero_angle_u, roll, yaw]]))
+            return self._live.feed(t, readings)
+        return self.feed_rows(np.concatenate([[t], readings])[None])
 
     def feed_rows(self, rows: Array) -> Answers:
         """Go on by rows (m, N + 6), time first."""
@@ -102,10 +93,8 @@ class LimitedLive:
         fused = band.causal(of, state.band, row[:1], row[None, 1:])
         motion, at = state.motion, state.at
         if len(fused.t):
-            z, at = fused.rows[0], float(fused.t[0])
-            answers = self._live.feed(
-                at, z[:count], z[count], z[count + 3], z[count + 4], z[count + 1], z[count + 2]
-            )
+            at = float(fused.t[0])
+            answers = self._live.feed(at, fused.rows[0])
             motion = np.full(MOTION, np.nan)
             if len(answers.t) and math.isfinite(answers.out[-1, 0]):
                 motion, out[OUTPUTS:] = self._live.motion, answers.innovations[-1]

@@ -6,7 +6,8 @@ of the body feels, at a fixed roll phi about x and pitching about a horizontal a
     f_x = g sin theta - r w^2 - c z al + s_x'
     f_z = c (g cos theta + r al) - c^2 z w^2 + s_z'
 
-with s_x', s_z' the flexure of the sting, outputs of two band-pass resonators s'' + 2 zeta w0 s' + w0^2 s = u. With
+with s_x', s_z' the flexure of the sting, outputs of two band-pass resonators s'' + 2 zeta w0 s' + w0^2 s = u; where
+the support plunges the latter is along the vertical, g + s_z' in the place of g and none in f_z. With
 gyros for roll and yaw (rates p about x, y about z, both right-handed) w is the body rate and the roll phi a state:
 
     f_x = g sin theta - r (w^2 + y^2) - z (al - p y) + s_x'
@@ -67,7 +68,8 @@ class Constants(NamedTuple):
     ``snap`` is a spectral density; ``accelerometer_noise``, ``gyro_noise`` and ``turn_noise`` (of the gyros for roll
     and yaw) are variances; ``accelerometer_walk`` and ``gyro_walk`` what those of the biases gain in a second; ``gate``
     is the largest square of an innovation over its variance. The resonators of the sting, for heave and axial motion,
-    have an angular frequency, a damping, and a level of the output.
+    have an angular frequency, a damping, and a level of the output; ``plunge`` is 1 where the first one is along the
+    vertical, else 0.
     """
 
     gravity: float
@@ -88,6 +90,7 @@ class Constants(NamedTuple):
     axial_frequency: float
     axial_damping: float
     axial_level: float
+    plunge: float
 
 
 class Model(NamedTuple):
@@ -156,6 +159,9 @@ def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float
     g, w, al = constants.gravity, x[1], x[2]
     ca, sa, r, z = geometry[i, 0], geometry[i, 1], geometry[i, 2], geometry[i, 3]
     levers, res, heights, roll = of.levers, of.resonators, of.heights, of.roll
+    plunge = constants.plunge if res >= 0 else 0.0
+    if plunge > 0.0:
+        g += x[res + 1]
     if levers >= 0:
         r += x[levers + i]
     if heights >= 0:
@@ -191,9 +197,10 @@ def accelerometer(i: int, at: Prediction, model: Model, out: Row) -> tuple[float
         row[1] = -2.0 * w * (ca * r - sa * cp * cp * z)
         row[2] = -cp * (ca * z + sa * r)
     if res >= 0:
-        fz += x[res + 1]
+        fz += (1.0 - plunge) * x[res + 1]
         fx += x[res + 3]
-        places[count], row[count] = res + 1, -sa
+        level = math.cos(x[roll]) if roll >= 0 else cp
+        places[count], row[count] = res + 1, plunge * (ca * s - sa * c * level) - (1.0 - plunge) * sa
         places[count + 1], row[count + 1] = res + 3, ca
         count += 2
     w, al = at.rate, at.acceleration

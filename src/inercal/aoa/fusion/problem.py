@@ -159,6 +159,7 @@ def _constants(settings: AoaSettings) -> Constants:
         axial_frequency=axial.frequency,
         axial_damping=axial.damping,
         axial_level=axial.level,
+        plunge=heave.vertical,
     )
     return Constants(*map(float, constants))
 

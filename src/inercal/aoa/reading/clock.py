@@ -49,3 +49,9 @@ def usual_step(t: Array) -> float:
     """Median interval [s] of ``t`` (n,); where rows come in bursts it is at least a sixteenth of the mean one, so that
     an even grid has no more than 16 n points."""
     return max(float(np.median(np.diff(t))), float(t[-1] - t[0]) / len(t) / 16.0)
+
+
+def settled(t: Array) -> NDArray[np.bool_]:
+    """Rows (n,) of ``t`` (n,) [s] after the time in which a filter settles; all of a shorter record."""
+    late = t - t[0] >= LIMITS.settling_time
+    return late if late.any() else np.ones(len(t), dtype=bool)

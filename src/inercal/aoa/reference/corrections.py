@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.fusion.problem import problem
+from inercal.aoa.limits import LIMITS
 from inercal.aoa.reference.sensor_fit import Verified
 from inercal.aoa.settings import AoaSettings, Estimator
 from inercal.arrays import Array
@@ -38,8 +39,8 @@ def report_of(verified: Verified) -> dict[str, Any]:
 def is_verified(earlier: Estimate) -> bool:
     """True for a result with a fit to a reference angle that is worth more than the fusion of the same record.
 
-    A short record, or one of few angles, hardly separates a scale or an axis from a bias: where a sensor would be worse
-    known than its bias is by the fusion, the fit is not used.
+    A short record, or one of few angles, hardly separates a scale or an axis from a bias: where a sensor would be known
+    much worse than its bias is by the fusion, which takes axes and scales for exact, the fit is not used.
     """
     fit = earlier.result.get("verified", {})
     if not fit.get("converged", False):
@@ -48,7 +49,7 @@ def is_verified(earlier: Estimate) -> bool:
     of_fusion = dict(zip(earlier.names, np.sqrt(np.diag(earlier.covariance)).tolist(), strict=True))
     count = sum(name.startswith("S_") for name in left)
     return all(
-        STANDARD_GRAVITY * left[f"{kind}_{k}"] <= of_fusion.get(f"b_{k}", math.inf)
+        STANDARD_GRAVITY * left[f"{kind}_{k}"] <= LIMITS.fit_ratio * of_fusion.get(f"b_{k}", math.inf)
         and f"{kind}_{k}" not in fit["unseen"]
         for kind in ("S", "dlambda")
         for k in range(1, count + 1)

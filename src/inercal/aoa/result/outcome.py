@@ -90,8 +90,7 @@ def assemble(
     names, at = tuple(problem.nuisances), list(problem.nuisances.values())
     values, P = filtered.state.x[at], filtered.state.P[np.ix_(at, at)]
     before = np.sqrt(np.diag(problem.covariance)[at])
-    of_sting = verdict.shaken(problem, filtered, settings)
-    all_findings = _all_findings(recording, [*findings, *([] if of_sting is None else [of_sting])])
+    all_findings = _all_findings(recording, findings)
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
     model = SPATIAL if problem.spatial else MODEL + FLAT

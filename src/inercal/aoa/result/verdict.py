@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from inercal.aoa.angles import Angles
 from inercal.aoa.fusion.filter_result import FilterResult
-from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
@@ -19,7 +18,6 @@ from inercal.estimate.factor import NEGATIVE
 from inercal.estimate.identifiability import UNSEEN
 from inercal.findings import CODES, Finding, Status, causes
 from inercal.records.places import counted, counted_names
-from inercal.units import STANDARD_GRAVITY
 
 
 def of_fusion(
@@ -109,28 +107,6 @@ def left_at_prior(names: Sequence[str], ratio: Array, settings: AoaSettings) -> 
         "oscillation lever arms, heights and the gyro's scale"
     )
     return Finding("at_prior", text)
-
-
-def shaken(problem: FilterProblem, filtered: FilterResult, settings: AoaSettings) -> Finding | None:
-    """``flexure``: a sting that shakes the model; None where it does not."""
-    at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
-    if settings.prior.heave.damping == LIMITS.shaking_damping:  # as the recording asked for: u has it
-        return None
-    if not at or not len(filtered.kept_t):
-        return None
-    rows = filtered.states[filtered.kept_t - filtered.kept_t[0] >= LIMITS.settling_time][:, at]
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    if not len(rows):
-        return None
-    rms = float(np.sqrt(np.mean(np.square(rows), axis=0)).max())
-    noise = settings.noise.accelerometer
-    if not rms > LIMITS.flexure_ratio * noise:
-        return None
-    text = (
-        f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, {rms / noise:.2g} times their noise: u "
-        "of the angle may be too small, by some 20 %"
-    )
-    return Finding("flexure", text, harm=("theta",))
 
 
 def _because(text: str, findings: Sequence[Finding]) -> str:
