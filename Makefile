@@ -7,7 +7,7 @@ DEMO := build/demo
 # Where it is set, each of the many processes of the tests would parse every module again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo quick test campaign coverage docs bench lock clean
+.PHONY: demo workbench quick test campaign coverage docs bench lock clean
 
 demo: .venv/run/installed
 	rm -rf $(DEMO)
@@ -15,6 +15,10 @@ demo: .venv/run/installed
 	$(RUN)/inercal calibrate imu $(DEMO)/xsens_acc.mat $(DEMO)/xsens_gyro.mat \
 	    --map $(DEMO)/xsens-map.toml --study $(DEMO)/xsens.toml \
 	    --out $(DEMO)/calibration.json --report $(DEMO)/report.html
+
+# In the browser; sessions and jobs lie in build/workbench.
+workbench: .venv/workbench/installed
+	.venv/workbench/bin/inercal workbench build/workbench
 
 # Under a minute: lint, types beside the tests, and of these what is near the change (tests/quick.py).
 quick: .venv/dev/installed
@@ -50,6 +54,7 @@ bench: .venv/dev/installed
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network.
 .venv/run/installed: requirements/run.txt pyproject.toml
 .venv/dev/installed: requirements/dev.txt pyproject.toml
+.venv/workbench/installed: requirements/workbench.txt pyproject.toml
 .venv/%/installed:
 	$(PYTHON) -m venv --clear .venv/$*
 	.venv/$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/$*.txt
@@ -60,6 +65,8 @@ bench: .venv/dev/installed
 lock:
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
 	    pyproject.toml requirements/build.in -o requirements/run.txt
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+	    --extra workbench pyproject.toml requirements/build.in -o requirements/workbench.txt
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
 	    --group dev pyproject.toml requirements/build.in -o requirements/dev.txt
 

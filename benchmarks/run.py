@@ -26,6 +26,7 @@ PARTS = {
     "Reading": "reading",
     "IMU by hand": "imu_calibration",
     "Ferraris": "ferraris",
+    "Strapdown": "strapdown_record",
     "Noise": "allan",
     "Sensitivity": "sensitivity",
     "Self-calibration": "selfcal_filters",

@@ -39,7 +39,7 @@ FLOORS = [
     {"laboratory"},
     {"validate"},
     {"face"},
-    {"cli", "__main__"},
+    {"cli", "workbench", "__main__"},
 ]
 SYSTEMS = {"imu", "strapdown", "turntable", "selfcal", "aoa"}
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
@@ -154,8 +154,8 @@ WITHIN = {
         "known_turns ferraris aided temperature task figures"
     ),
     "strapdown": (
-        "limits coefficients settings kernels samples arrow simulate rests start batch bounds path_search design "
-        "budget left_out restricted reading outcome task figures"
+        "limits coefficients settings kernels samples arrow simulate rests start batch error_state bounds path_search "
+        "design budget left_out restricted reading outcome task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
@@ -346,10 +346,11 @@ def names_defined(tree):
 
 
 def is_called_from_outside(module, node):
-    """Python's own names, checks that pydantic runs, what notebooks call, and the commands."""
+    """Python's own names, checks that pydantic runs, what notebooks and the web call, and the commands."""
     checked = any("_validator" in ast.unparse(each) for each in node.decorator_list)
+    asked = any(ast.unparse(each).startswith("app.") for each in node.decorator_list)
     of_others = node.name in ("nullable_schema", "_repr_html_")
-    return node.name.startswith("__") or checked or of_others or room(module) == "cli"
+    return node.name.startswith("__") or checked or asked or of_others or room(module) == "cli"
 
 
 def prints(node):

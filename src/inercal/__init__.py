@@ -76,6 +76,7 @@ Map, lower floors first; each imports only from those above its own line
     laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     face                       the verbs of Python, and the results that they give back
+    workbench                  the commands in a browser
     cli                        one module per verb
 """
 

@@ -43,7 +43,7 @@ READ_A_STUDY = {
     *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
-WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun"} | {
+WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
     f"store {kind}" for kind in ("init", "upgrade", "check", "export", "import")
 }
 TEMPLATES = {
@@ -78,10 +78,10 @@ def options(text):
 
 
 def test_an_option_has_one_kind_of_value_and_one_text_in_all_commands(helps):
-    """Whoever knows one command knows the options of the others; --compare and --stream say what each compares.
+    """Whoever knows one command knows the options of the others; --compare, --filter and --stream say what each has.
 
     --runs is a number of simulated runs, and of `aoa` the table that lists them; `keep` is given a --report."""
-    own = {"--compare", "--stream", "--runs", "--report"}
+    own = {"--compare", "--filter", "--stream", "--runs", "--report"}
     meanings = {}
     for command, text in helps.items():
         for name, (value, words) in options(text).items():

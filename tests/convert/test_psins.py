@@ -95,7 +95,7 @@ def test_accelerometers_alone_have_no_place():
     ("old", "new", "words"),
     [
         ("% ug\r", "\r", "states no unit of eb and db, expected"),
-        ("tGA = [\r\n\t0", "tGA = [\r\n\t5", "found tGA, for which inercal's triads have no place"),
+        ("tGA = [", "Kap = [\r\n\t5 0 0\r\n\t];\r\ntGA = [", "found Kap, for which inercal has no place"),
         ("Ka = [", "Kx = [", "found Kg, eb, Kx, db.* expected Kg, eb, Ka, db"),
         ("3.00000000e+02", "", "db has 2 numbers, expected 3"),
         ("3.00000000e+02", "3*glv.ug", "db: .*expected numbers in brackets"),

@@ -30,6 +30,7 @@ SLOW = [
     "docs/how-to/live.md",
     "docs/how-to/noise.md",
     "docs/how-to/on-a-table-with-known-angles.md",
+    "docs/how-to/poses-or-turns.md",
     "docs/how-to/read-your-files.md",
     "docs/how-to/rig-of-two-axes.md",
     "docs/how-to/several-records.md",

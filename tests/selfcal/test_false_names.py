@@ -11,7 +11,8 @@ from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import NAMES
-from inercal.selfcal.settings import Disturbances, Noise
+from inercal.selfcal.platform.states import BIAS_WALK, EXTENDED_MODEL
+from inercal.selfcal.settings import Disturbances, Model, Noise
 
 STUDY = study(path="best")
 COARSE = Noise(0.1 * DEG / 60.0, 5000.0 * MICRO_G, 600.0 * ARCSEC)
@@ -159,3 +160,14 @@ def test_flicker_of_accelerometers_is_no_walk_of_the_gyros(floor, words):
     )
     assert words in found.message
     assert "name bias_walk" in found.message
+
+
+@pytest.mark.slow
+def test_biases_that_walk_more_than_stated_are_told_by_how_much():
+    """Where they are states already, and what is stated of them is too little."""
+    asked = replace(STUDY, model=Model((*EXTENDED_MODEL[:6], *BIAS_WALK)))
+    noisy = replace(asked, disturbances=Disturbances(flicker=3.0 * MICRO_G))
+    found = only(named(recorded(noisy), asked), "unmodelled")
+    assert "biases that wander" in found.message
+    assert "times accelerometer_walk and gyro_walk under [noise]" in found.message
+    assert "states under" not in found.message

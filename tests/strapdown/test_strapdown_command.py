@@ -183,24 +183,6 @@ def test_a_plan_is_needed_to_simulate(folder, capsys):
     assert not (folder / "none.csv").exists()
 
 
-def test_a_calibration_is_applied_without_what_a_sample_does_not_tell(folder, capsys):
-    calibrate("--out", "cal.json")
-    capsys.readouterr()
-    assert run(["apply", "cal.json", "run.npz", "--out", "true.npz"]) == 0
-    assert "not_held: r_xx, r_xy, r_xz, r_yx, r_yy, r_yz, tau_a: not applied" in capsys.readouterr().err
-    true, rest = ic.read("true.npz"), slice(100, 600)
-    force = [true[f"acc_{axis}"].values[rest].mean() for axis in "xyz"]
-    assert np.linalg.norm(force) == pytest.approx(9.7965, rel=1e-4)
-
-
-@pytest.mark.parametrize("tool", ["psins", "kalibr", "imu_tk", "imucal"])
-def test_other_tools_are_told_what_they_do_not_hold(tool, folder, capsys):
-    calibrate("--out", "cal.json")
-    capsys.readouterr()
-    assert run(["convert", "cal.json", "--to", tool]) == 0
-    assert "K2_z, r_xx, r_xy, r_xz, r_yx, r_yy, r_yz, tau_a" in capsys.readouterr().err
-
-
 def test_repeat_runs_are_combined(folder, capsys):
     capsys.readouterr()
     assert run(["simulate", "strapdown", "strapdown.toml", "--seed", "4", "--out", "two.npz", "--quiet"]) == 0

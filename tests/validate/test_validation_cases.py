@@ -14,7 +14,7 @@ from inercal.findings import Status
 from inercal.geometry import earth, rotations
 from inercal.noise import deviation
 from inercal.selfcal.platform import rig
-from inercal.validate import aoa, foundation, imu, noise, selfcal, turntable
+from inercal.validate import aoa, foundation, imu, noise, selfcal, strapdown, turntable
 from inercal.validate.case import SOURCES, Case, Numbers, find, judge
 from inercal.validate.run import SYSTEMS, cases_of, validate
 from rows import for_each
@@ -137,6 +137,7 @@ def fresh():
     kept = [
         *(imu._calibrated, imu._session),
         *(turntable._full_circle, selfcal._study, selfcal._found, aoa._sting),
+        *(strapdown._study, strapdown._found),
     ]
     for each in kept:
         each.cache_clear()
@@ -193,6 +194,11 @@ def test_an_earth_that_turns_backward(monkeypatch, fresh):
         rig, "earth_rate", lambda latitude: tuple(-part for part in earth.earth_rate(latitude))
     )
     assert "platform-truth" in red(selfcal.CASES, "platform-truth")
+
+
+def test_an_earth_that_turns_backward_under_a_strapdown_unit(monkeypatch, fresh):
+    monkeypatch.setattr("inercal.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
+    assert "strapdown-psins-truth" in red(strapdown.CASES, "strapdown-psins-truth")
 
 
 def test_a_tool_whose_matrix_is_transposed(monkeypatch, fresh):

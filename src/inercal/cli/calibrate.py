@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -21,10 +21,13 @@ from inercal.cli.options import (
     working,
 )
 from inercal.cli.outcome import WHOLE, give
+from inercal.cli.streaming import StreamOptions, recorded, stream_study
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
+    from inercal.cli.streaming import Estimators
     from inercal.imu.temperature.model import TemperatureModel
+    from inercal.strapdown.settings import StrapdownSettings
 
 
 def calibrate_imu(
@@ -44,17 +47,52 @@ def calibrate_imu(
 
 
 def calibrate_strapdown(
-    files: RunFiles,
+    files: Annotated[
+        list[Path] | None,
+        Parameter(
+            help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
+        ),
+    ] = None,
     /,
     *,
     study: StudyFile,
+    estimator: Annotated[
+        Literal["batch", "error-state"] | None,
+        Parameter(name="--filter", help="Estimator, in the place of that of the study."),
+    ] = None,
+    stream: Annotated[
+        bool,
+        Parameter(
+            help="Lines in, from standard input or one FILE, and coefficients out after each rest, live."
+        ),
+    ] = False,
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate a strapdown unit from rests and coarse turns."""
-    return _calibrated("strapdown", files, study, map_file, span, overrides, output)
+    keys = [*(overrides or ()), *([f"strapdown.filter={estimator}"] if estimator is not None else [])]
+    if stream:
+        if estimator == "batch":
+            raise InputError(
+                "--filter", "found batch with a stream, expected error-state, which goes rest by rest"
+            )
+        stream_study("strapdown", _live, files, study, keys, None, map_file, span, streaming, output)
+        return 0
+    paths = recorded("calibrate strapdown", files, streaming)
+    return _calibrated("strapdown", paths, study, map_file, span, keys, output)
+
+
+def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) -> Estimators:
+    """Prepare a calibration rest by rest."""
+    from inercal._jit import compiling
+    from inercal.stream.strapdown import Strapdown, load_kernels
+
+    with compiling("strapdown stream", output.say):
+        load_kernels(settings)
+    return lambda lines: Strapdown(lines, settings, output.say_finding)
 
 
 def calibrate_turntable(

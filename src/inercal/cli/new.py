@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +13,6 @@ from inercal.errors import InputError
 
 if TYPE_CHECKING:
     from inercal.studies.template import Kind
-    from inercal.units import Unit
 
 Rate = Annotated[
     str | None,
@@ -102,46 +100,13 @@ def new_lab(
     emit(without_coefficients("new lab", words, {"lab": str(path)}), words, output)
 
 
-def _described(
-    kind: Kind, files: list[Path], rate: str | None
-) -> tuple[Mapping[str, Unit | None], str | None]:
-    """Channels of the recordings, with their units where known, and a map where the headers do not say these."""
-    from inercal.records.channels import of_a_table
-    from inercal.records.guess import guess_map
-    from inercal.records.read import canonical_units
-
-    if not files:
-        return {}, None
-    channels: Mapping[str, Unit | None] = {} if kind == "imu" else canonical_units(files) or {}
-    plain = {
-        "imu": False,
-        "strapdown": {"acc_x", "gyro_x"} <= channels.keys(),
-        "turntable": of_a_table(channels),
-        "selfcal": "th_x" in channels,
-        "aoa": "a1" in channels,
-    }
-    if plain[kind]:
-        return channels, None
-    column_map = guess_map(files, on_table=kind == "turntable", of_model=kind == "aoa", rate=rate)
-    return (dict.fromkeys(_mapped(column_map)) if kind in ("imu", "turntable") else channels), column_map
-
-
-def _mapped(column_map: str) -> list[str]:
-    """The channels of a map."""
-    import tomllib
-
-    data = tomllib.loads(column_map)
-    parts = [data, *(part for part in data.get("file", {}).values() if isinstance(part, dict))]
-    return [name for part in parts for name in part.get("columns", ())]
-
-
 def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
     from inercal.estimate.result import without_coefficients
+    from inercal.face.beginning import begun, mapped
     from inercal.records.read import source_of
     from inercal.studies.starting import UNKNOWN
-    from inercal.studies.template import template
     from inercal.units import parse_quantity
 
     output.check((".toml",), files)
@@ -150,14 +115,14 @@ def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput
             raise InputError("--rate", f"found {rate}, expected a rate above 0")
         if not files:
             raise InputError("--rate", "found without a recording, expected one for the map")
-    channels, column_map = _described(kind, files, rate)
     study = output.out or Path(f"{kind}.toml")
-    map_file = None if column_map is None else study.with_name(f"{study.stem}-map{study.suffix}")
+    beside = study.with_name(f"{study.stem}-map{study.suffix}")
+    text, column_map = begun(kind, files, study, beside, rate, overrides)
+    map_file = None if column_map is None else beside
     written = [study] if map_file is None else [study, map_file]
     for path in written:
         if path.exists():
             raise InputError(path, "exists already, expected a new file name (--out)")
-    text = template(kind, files, study, map_file, channels, overrides)
     write_text(study, text)
     if map_file is not None and column_map is not None:
         write_text(map_file, column_map)
@@ -165,6 +130,6 @@ def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput
     words = "\n".join(f"{path}: look it over and correct it" for path in written)
     if f'= "{UNKNOWN}" ' in text:
         words = words.replace("look it over and correct it", f'fill in each "{UNKNOWN}" and look it over', 1)
-    if column_map is not None and not _mapped(column_map):
+    if column_map is not None and not mapped(column_map):
         words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
     emit(without_coefficients(f"new {kind}", words, result, map(source_of, files)), words, output)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from os.path import realpath
@@ -43,6 +44,9 @@ Overrides = Annotated[
     list[str] | None, Parameter(name="--set", help="Override one study key: key=value. May be repeated.")
 ]
 
+
+PROGRESS = "INERCAL_PROGRESS"
+"""Variable of the environment that names a file which takes the progress of a command, its last words alone."""
 
 _LONG = 10.0
 """Time [s] after which a command that has no terminal to show its progress on says that it is at work."""
@@ -285,9 +289,18 @@ def whole_number(kind: object, tokens: Sequence[Token]) -> int:
         raise InputError(typed.keyword, f"found {typed.value!r}, expected a whole number") from error
 
 
+def _last_words(path: Path, text: str) -> None:
+    """Put the progress into a file, in the place of what was there."""
+    with suppress(OSError):
+        path.write_text(printable(text), encoding="utf-8")
+
+
 @contextmanager
 def working(output: Output) -> Iterator[Callable[[str], None]]:
     """A callback (text) that shows progress on a terminal and leaves nothing; elsewhere see `_once`."""
+    if PROGRESS in os.environ:
+        yield partial(_last_words, Path(os.environ[PROGRESS]))
+        return
     if output.quiet or not sys.stderr.isatty():
         yield _once(output)
         return
@@ -313,6 +326,10 @@ def _once(output: Output) -> Callable[[str], None]:
 @contextmanager
 def reading(output: Output, what: str = "reading") -> Iterator[Callable[[int, int], None] | None]:
     """A callback (done, total) that shows a bar on a terminal once a second has passed; elsewhere see `_once`."""
+    if PROGRESS in os.environ:
+        path = Path(os.environ[PROGRESS])
+        yield lambda done, total: _last_words(path, f"{what}, {100 * done / max(total, 1):.0f} %")
+        return
     if output.quiet:
         yield None
         return

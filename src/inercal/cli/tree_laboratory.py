@@ -74,4 +74,11 @@ LABORATORY = {
         "coefficient whether it is equal to the last digit, within u, or changed. Exit code 1: something changed.",
         "inercal rerun 6fee8a0a58",
     ),
+    ("workbench", ""): (
+        "inercal.cli.workbench:workbench",
+        "Work in the browser: from a raw log to a certificate, on this machine and without any network.\n\n"
+        "Sessions and jobs lie in FOLDER and are found again when it is begun anew. The page shows the command "
+        "and the study for every step. Programs find the same under /api/v1. The extra `workbench` is needed.",
+        "inercal workbench",
+    ),
 }

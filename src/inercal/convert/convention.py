@@ -104,11 +104,12 @@ def in_si_outputs(model: ImuModel) -> ImuModel:
         unit = parse_unit(units[sensor]) if sensor in units else None
         if unit is not None and unit.dimension == parse_unit(si).dimension:
             factors[sensor], units[sensor] = unit.factor, si
-    return ImuModel(
-        _scaled(model.accelerometer, factors["acc"]),
-        None if model.gyro is None else _scaled(model.gyro, factors["gyro"]),
-        model.g_sensitivity * factors["gyro"],
-        units,
+    return replace(
+        model,
+        accelerometer=_scaled(model.accelerometer, factors["acc"]),
+        gyro=None if model.gyro is None else _scaled(model.gyro, factors["gyro"]),
+        g_sensitivity=model.g_sensitivity * factors["gyro"],
+        units=units,
     )
 
 
@@ -145,5 +146,8 @@ def flat(terms: Terms) -> tuple[list[str], Array]:
     names: list[str] = []
     for term, array in terms.items():
         axes = ["xyz"[i] for i in range(3)]
-        names += [f"{term}_{i}{j}" for i in axes for j in (axes if array.ndim == 2 else ("",))]
+        if array.ndim == 0:
+            names.append(term)
+        else:
+            names += [f"{term}_{i}{j}" for i in axes for j in (axes if array.ndim == 2 else ("",))]
     return names, np.concatenate([array.ravel() for array in terms.values()])

@@ -9,6 +9,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.convert.correction import Correction, Samples, factor_of, range_of, widened
+from inercal.convert.motion import Placed, where_even
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -23,6 +24,9 @@ TERMS_IN_USE = (
     *(f"K2_{axis}" for axis in "xyz"),
     *GYRO_TRIAD,
     *GYRO_G_SENSITIVITY,
+    *(f"S_asym_{axis}" for axis in "xyz"),
+    *(f"r_{i}{j}" for i in "xy" for j in "xyz"),
+    "tau_a",
 )
 """Terms of an IMU that are applied."""
 
@@ -34,6 +38,8 @@ class ImuModel:
     ``units`` are those of the outputs it was calibrated for, by sensor; ``gyro`` is None where only the
     accelerometers were calibrated; ``g_sensitivity`` (3, 3) [gyro output/(m/s^2)]; ``second_order`` (3,) [1/(m/s^2)]
     is K2 of the accelerometers, whose output is K0 + K1 (s + K2 s^2) at the specific force s along the input axis.
+    ``asymmetry`` (3,) is S_asym of the gyros, whose output is that of the triad and S S_asym |w| / 2. ``levers`` (3, 3)
+    [m] are the places of accelerometers x, y, z in b, ``delay`` [s] is by how much they are late against the stamps.
     ``rates`` (2, 3) [rad/s] are the least and the largest of the calibration, None where it does not say.
     """
 
@@ -43,20 +49,65 @@ class ImuModel:
     units: dict[str, str]
     second_order: Array = field(default_factory=lambda: np.zeros(3))
     rates: Array | None = None
+    asymmetry: Array = field(default_factory=lambda: np.zeros(3))
+    levers: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    delay: float = 0.0
+
+    @property
+    def placed(self) -> Placed | None:
+        """Places and delay of the accelerometers, where there are any."""
+        return Placed(self.levers, self.delay) if self.levers.any() or self.delay else None
 
     def correct(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:
         """Specific force (*batch, 3) [m/s^2] and rate (*batch, 3) [rad/s] from outputs."""
         f = self.accelerometer.correct(self._straight(acc))
         if gyro is None or self.gyro is None:
             return f, None
-        return f, self.gyro.correct(gyro - self._drift(f))
+        return f, self._rate(self.gyro, gyro, f)
 
     def indicate(self, f: Array, omega: Array | None) -> tuple[Array, Array | None]:
         """Outputs from specific force [m/s^2] and rate [rad/s]: the inverse of `correct`."""
         acc = self._bent(self.accelerometer.indicate(f))
         if omega is None or self.gyro is None:
             return acc, None
-        return acc, self.gyro.indicate(omega) + self._drift(f)
+        uneven = 0.5 * self.asymmetry * self.gyro.scale * np.abs(omega) if self.asymmetry.any() else 0.0
+        return acc, self.gyro.indicate(omega) + self._drift(f) + uneven
+
+    def _rate(self, triad: TriadModel, gyro: Array, f: Array) -> Array:
+        """Rate of the gyros' outputs, by fixed-point steps where their scale factors are not even."""
+        straight = gyro - self._drift(f)
+        omega = triad.correct(straight)
+        if self.asymmetry.any():
+            for _ in range(4):
+                omega = triad.correct(straight - 0.5 * self.asymmetry * triad.scale * np.abs(omega))
+        return omega
+
+    def _moving(
+        self, t: Array, step: float, acc: Array, gyro: Array, invert: bool
+    ) -> tuple[Array, Array, Array]:
+        """`correct`, or with ``invert`` `indicate`, of samples (n, 3) one after the other at ``t`` (n,) [s], with the
+        places and the delay of the accelerometers; and where (n,) these are applied."""
+        placed, triad = self.placed, self.gyro
+        assert placed is not None
+        assert triad is not None
+
+        def forward() -> tuple[Array, Array]:
+            felt, _ = self.indicate(acc + placed.of_turning(gyro, step), None)
+            _, rate = self.indicate(acc, gyro)
+            return placed.at_stamp(felt, step, True), gyro if rate is None else rate
+
+        def back() -> tuple[Array, Array]:
+            felt = self.accelerometer.correct(self._straight(placed.at_stamp(acc, step, False)))
+            f = felt
+            for _ in range(2 if self.g_sensitivity.any() else 1):
+                f = felt - placed.of_turning(self._rate(triad, gyro, f), step)
+            return f, self._rate(triad, gyro, f)
+
+        def still() -> tuple[Array, Array]:
+            f, w = self.indicate(acc, gyro) if invert else self.correct(acc, gyro)
+            return f, w if w is not None else gyro
+
+        return where_even(t, step, placed.reach(step), forward if invert else back, still)
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of a record, whose columns may be without samples yet; with ``invert`` it holds true values.
@@ -89,6 +140,8 @@ class ImuModel:
                 reads[name] = factor_of(record[name], wanted, of)
                 writes[name] = (name, written)
         both = self.indicate if invert else self.correct
+        placed = self.placed
+        moving = placed is not None and gyro is not None
 
         def work(samples: Samples) -> Samples:
             given = {
@@ -96,8 +149,16 @@ class ImuModel:
                 for sensor in ("acc", "gyro")
                 if f"{sensor}_x" in writes
             }
-            results = zip(("acc", "gyro"), both(given["acc"], given.get("gyro")), strict=True)
-            return {
+            applied: dict[str, Array] = {}
+            if moving:
+                step = float(samples["step"])
+                f, w, sound = self._moving(samples["t"], step, given["acc"], given["gyro"], invert)
+                applied = {"applied": sound}
+                pair: tuple[Array, Array | None] = f, w
+            else:
+                pair = both(given["acc"], given.get("gyro"))
+            results = zip(("acc", "gyro"), pair, strict=True)
+            return applied | {
                 f"{sensor}_{axis}": values[..., i]
                 for sensor, values in results
                 if values is not None
@@ -108,11 +169,20 @@ class ImuModel:
         settings = {**triads, "g": self.g_sensitivity, "units": self.units, "invert": invert}
         if self.second_order.any():
             settings["k2"] = self.second_order
+        findings: tuple[Finding, ...] = ()
+        if placed is not None:
+            settings |= {"levers": self.levers, "delay": self.delay}
+            if gyro is None:
+                text = "no gyro tells the turning: places and delay of the accelerometers are not applied"
+                findings = (Finding("not_held", text),)
+        if self.asymmetry.any():
+            settings["asymmetry"] = self.asymmetry
         ranges = {}
         if gyro is not None and self.rates is not None and not invert:
             ends = zip("xyz", *self.rates.tolist(), strict=True)
             ranges = {f"gyro_{axis}": widened(low, high, "rad/s") for axis, low, high in ends}
-        return Correction(work, reads, writes, settings, ranges=ranges)
+        reach = placed.reach if moving and placed is not None else None
+        return Correction(work, reads, writes, settings, findings=findings, ranges=ranges, reach=reach)
 
     def _straight(self, acc: Array) -> Array:
         """Outputs of the accelerometers as they would be without K2: the root of s + K2 s^2 that is small with it."""
@@ -169,7 +239,17 @@ def imu_of(values: Mapping[str, float] | Mapping[str, Array], units: dict[str, s
         np.stack(np.broadcast_arrays(*rows), axis=-2),
         units,
         np.stack(np.broadcast_arrays(*(values.get(f"K2_{axis}", 0.0) for axis in "xyz")), axis=-1),
+        asymmetry=np.stack(
+            np.broadcast_arrays(*(values.get(f"S_asym_{axis}", 0.0) for axis in "xyz")), axis=-1
+        ),
+        levers=np.array([[_fixed(values.get(f"r_{i}{j}", 0.0)) for j in "xyz"] for i in "xyz"]),
+        delay=0.0 if "tau_g" in values else _fixed(values.get("tau_a", 0.0)),
     )
+
+
+def _fixed(value: float | Array) -> float:
+    """A term of the motion, which no temperature changes from sample to sample: the mean of it."""
+    return float(np.mean(value))
 
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
@@ -183,7 +263,8 @@ def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Find
             f"D_F is the bias at {time} of that"
         )
         findings.append(Finding("not_held", text, str(where)))
-    other = [name for name in estimate.names if name not in TERMS_IN_USE and not name.startswith("D_R_")]
+    in_use = {*TERMS_IN_USE} - ({"tau_a"} if "tau_g" in estimate.names else set())
+    other = [name for name in estimate.names if name not in in_use and not name.startswith("D_R_")]
     if other:
         text = f"{', '.join(other)}: not applied, for a sample by itself does not tell the motion they act on"
         findings.append(Finding("not_held", text, str(where)))

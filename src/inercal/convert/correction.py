@@ -9,10 +9,12 @@ from typing import Protocol
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.convert.motion import interval
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
 from inercal.records.column import Column
+from inercal.records.places import counted
 from inercal.records.record import Record
 from inercal.units import Unit, parse_unit
 
@@ -45,6 +47,10 @@ class Correction:
     column that takes the place of another, ``appends`` name and unit of those behind the others. ``settings`` is all
     that decides the results, ``findings`` name what the record does not hold, so that it is not corrected for, and
     ``ranges`` has the lowest and highest value of the calibration (as ``work`` has it) of a column, and their unit.
+
+    With a ``reach`` ``work`` takes rows one after the other, with stamps ``t`` and their usual ``step`` [s], of which
+    it says how many rows before and behind a row it needs. It then also gives ``applied``, 0 for rows whose neighbours
+    have uneven stamps, so that they are corrected each by itself.
     """
 
     work: Callable[[Samples], Samples]
@@ -54,6 +60,7 @@ class Correction:
     appends: Mapping[str, Unit] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     ranges: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    reach: Callable[[float], int] | None = None
 
     def __call__(self, samples: Samples) -> Samples:
         """All columns written, and those read as ``work`` has them, for samples in the units of the record."""
@@ -62,11 +69,23 @@ class Correction:
             taken[name] = samples[name] * factor
             if zero:
                 taken[name] = taken[name] + zero
+        if self.reach is not None:
+            taken |= {"t": samples["t"], "step": samples["step"]}
         return {**taken, **self.work(taken)}
+
+    def rows(self, step: float) -> int:
+        """Rows before and behind a row that its correction needs, of samples every ``step`` [s]."""
+        return self.reach(step) if self.reach is not None and np.isfinite(step) else 0
 
     def outside(self, results: Samples) -> tuple[Finding, ...]:
         """``outside_range``: results of a call that lie beyond what the calibration was made over."""
         findings = []
+        if "applied" in results and (left := int(np.sum(np.asarray(results["applied"]) == 0.0))):
+            text = (
+                f"{counted(left, 'row')} beside uneven steps of time: places of the accelerometers and delay are not "
+                "applied there"
+            )
+            findings.append(Finding("not_held", text))
         for name, (low, high, unit) in self.ranges.items():
             values = np.asarray(results[name])
             beyond = int(np.sum((values < low) | (values > high)))
@@ -149,12 +168,7 @@ def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
     """
     correct = model.correction(record, invert)
     some = record[next(iter(correct.writes))]
-    rows = len(some.values)
-    blocks = [
-        correct({name: record[name].values[begin : begin + BLOCK] for name in correct.reads})
-        for begin in range(0, max(rows, 1), BLOCK)
-    ]
-    results = {name: np.concatenate([np.atleast_1d(block[name]) for block in blocks]) for name in blocks[0]}
+    results = _in_blocks(record, correct, some)
     columns = {}
     for name, column in record.columns.items():
         new, unit = correct.writes.get(name, (name, column.unit))
@@ -165,6 +179,20 @@ def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
         columns[name] = Column(name, unit, results[name], some.t, some.source)
     findings = (*record.findings, *correct.findings, *correct.outside(results))
     return Record(columns, findings, record.sources, record.labels)
+
+
+def _in_blocks(record: Record, correct: Correction, some: Column) -> Samples:
+    """Results of a correction for all rows, a block after the other; ``some`` is a column that is written."""
+    rows, step = len(some.values), interval(some.t)
+    reach, blocks = correct.rows(step), []
+    for begin in range(0, max(rows, 1), BLOCK):
+        first, last = max(begin - reach, 0), min(begin + BLOCK + reach, rows)
+        samples = {name: record[name].values[first:last] for name in correct.reads}
+        if correct.reach is not None:
+            samples |= {"t": some.t[first:last], "step": np.array(step)}
+        own = slice(begin - first, begin - first + BLOCK)
+        blocks.append({name: np.atleast_1d(x)[own] for name, x in correct(samples).items() if name != "step"})
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
 def one_clock(record: Record, names: Sequence[str]) -> None:

@@ -122,7 +122,7 @@ def _jacobian(estimate: Estimate, function: Callable[[Array], Array]) -> Array:
     """
     columns = []
     for j, (name, x, u) in enumerate(zip(estimate.names, estimate.values, estimate.u, strict=True)):
-        if name.startswith(("K1_", "S_")):
+        if name.startswith(("K1_", "S_")) and not name.startswith("S_asym_"):
             h = 1e-6 * abs(x)
         elif name.startswith(("M_", "T_")):
             h = 1e-6
@@ -210,7 +210,13 @@ def coefficients(model: ImuModel) -> dict[str, float]:
         values |= _of_triad(model.gyro, "D_F", "S", "T", full=True)
         if model.g_sensitivity.any():
             values |= dict(zip(GYRO_G_SENSITIVITY, model.g_sensitivity.ravel().tolist(), strict=True))
-    return values
+    if model.second_order.any():
+        values |= {f"K2_{axis}": float(x) for axis, x in zip("xyz", model.second_order, strict=True)}
+    if model.levers.any():
+        values |= {
+            f"r_{i}{j}": float(model.levers["xyz".index(i), "xyz".index(j)]) for i in "xy" for j in "xyz"
+        }
+    return values | ({"tau_a": model.delay} if model.delay else {})
 
 
 def _of_triad(triad: TriadModel, bias: str, scale: str, misalignment: str, full: bool) -> dict[str, float]:

@@ -1,20 +1,22 @@
 """To and from PSINS (Gongmin Yan): the struct ``clbt`` of its function imuclbt, as a MATLAB script to run.
 
     gyro_1 = sf_g gyro            acc_1 = sf_a acc
-    w = Kg gyro_1 - eb - gSens acc_1      f = Ka acc_1 - db
+    w = Kg gyro_1 - eb - gSens acc_1
+    f = f_1 - fL - tGA w x f_1            f_1 = Ka acc_1 - db - Ka2 (Ka acc_1)^2
 
-for rates; imuclbt works on increments, outputs times the sampling time. sf scales the outputs (gyro first) to
-rad/s and m/s^2, Kg and Ka are close to one. With our y = S M x + b and the gyro's + G f: sf = 1/S, Ka = M^-1,
-Kg = T^-1, db = Ka sf_a b; g-sensitivity acts there on the accelerometers' output before Ka and db, so
-gSens = (S T)^-1 G Ka and eb = Kg sf_g b - (S T)^-1 G db. Nothing is lost either way, and the frames are the
-same (Ka is full or upper-triangular where PSINS' own sysclbt, with x along accelerometer x, makes it
-lower-triangular).
+for rates, fL being what turning does at the places rx, ry, rz of the accelerometers; imuclbt works on increments,
+outputs times the sampling time. sf scales the outputs (gyro first) to rad/s and m/s^2, Kg and Ka are close to one.
+With our y = S M x + b and the gyro's + G f: sf = 1/S, Ka = M^-1, Kg = T^-1, db = Ka sf_a b; g-sensitivity acts there on
+the accelerometers' output before Ka and db, so gSens = (S T)^-1 G Ka and eb = Kg sf_g b - (S T)^-1 G db. Nothing of
+these is lost either way, and the frames are the same (Ka is full or upper-triangular where PSINS' own sysclbt, with x
+along accelerometer x, makes it lower-triangular). Ka2 = K2, rx and ry are r_x and r_y, tGA = tau_a, to first order:
+PSINS has no more. Scale factors that differ by the sign of the rate have no place there.
 
 The script sets ``clbt.sf``, ``clbt.Kg`` ... in SI units, as imuclbt takes them. The text that PSINS' clbtfile writes
-has bare names instead and states eb in deg/h and db in ug; clbtfile reads these numbers back without
-their units, so it is a form to read here but not one to write. Its binary form has other lengths in other versions
-and no gSens. Second-order terms, lever arms and delays (Ka2, Kap, rx, ry, rz, tGA) have no place in inercal's triads:
-a file in which they are not zero is refused.
+has bare names instead and states eb in deg/h, db in ug, Ka2 in ug/g^2, places in cm and tGA in ms; clbtfile reads these
+numbers back without their units, so it is a form to read here but not one to write. Its binary form has other lengths
+in other versions and no gSens. An asymmetry Kap of the accelerometers has no place here: a file in which it is not zero
+is refused. Places are told from rz on, the origin of inercal's.
 
 Source: base/imu/imuclbt.m, imuadderr.m, clbtfile.m and base/kf/sysclbt.m of the PSINS toolbox (Gongmin Yan,
 Northwestern Polytechnical University), as kept in github.com/WangShanpeng/PSINS.
@@ -51,9 +53,16 @@ _G0 = 9.7803267715
 """The g of PSINS' units ug and deg/h/g [m/s^2] (glvf.m)."""
 
 _DPH = parse_unit("deg/h").factor
-_SIZES = {"sf": 6, "Kg": 9, "eb": 3, "Ka": 9, "db": 3, "gSens": 9}
-_OTHERS = ("Ka2", "Kap", "rx", "ry", "rz", "tGA")
-_IN_CLBTFILE = {"eb": _DPH, "db": 1e-6 * _G0, "gSens": _DPH / _G0}
+_MOTION = ("Ka2", "rx", "ry", "rz", "tGA")
+"""Terms that are written where they are not zero."""
+
+_SIZES = {"sf": 6, "Kg": 9, "eb": 3, "Ka": 9, "db": 3, "gSens": 9} | {
+    name: 1 if name == "tGA" else 3 for name in _MOTION
+}
+_IN_CLBTFILE = {
+    "eb": _DPH, "db": 1e-6 * _G0, "gSens": _DPH / _G0, "Ka2": 1e-6 / _G0,
+    "rx": 0.01, "ry": 0.01, "rz": 0.01, "tGA": 1e-3,
+}  # fmt: skip
 
 
 def terms(model: ImuModel) -> Terms:
@@ -65,7 +74,8 @@ def terms(model: ImuModel) -> Terms:
     drift = (Kg * sf_g) @ model.g_sensitivity
     return {
         "sf_g": sf_g, "Kg": Kg, "eb": Kg @ (sf_g * gyro.bias) - drift @ db, "gSens": drift @ Ka,
-        "sf_a": sf_a, "Ka": Ka, "db": db,
+        "sf_a": sf_a, "Ka": Ka, "db": db, "Ka2": model.second_order,
+        **{f"r{axis}": row for axis, row in zip("xyz", model.levers, strict=True)}, "tGA": np.array(model.delay),
     }  # fmt: skip
 
 
@@ -79,6 +89,9 @@ def model(terms: Terms, units: Units) -> ImuModel:
         triad_of_gain(gain_g, gain_g @ (terms["eb"] + drift @ terms["db"]), "psins"),
         gain_g @ drift,
         units,
+        terms["Ka2"],
+        levers=np.stack([terms["rx"], terms["ry"], terms["rz"]]) - terms["rz"],
+        delay=float(terms["tGA"]),
     )
 
 
@@ -86,7 +99,8 @@ def _term_units(units: Units) -> Units:
     """Unit of each term."""
     return {
         "sf_g": per(RATE, units["gyro"]), "Kg": "1", "eb": RATE, "gSens": per(RATE, FORCE),
-        "sf_a": per(FORCE, units["acc"]), "Ka": "1", "db": FORCE,
+        "sf_a": per(FORCE, units["acc"]), "Ka": "1", "db": FORCE, "Ka2": per("1", FORCE),
+        "rx": "m", "ry": "m", "rz": "m", "tGA": "s",
     }  # fmt: skip
 
 
@@ -105,6 +119,11 @@ def render(terms: Terms, units: Units) -> dict[str, str]:
         elif name == "gSens" and not terms[name].any():
             continue
         lines.append(f"clbt.{name} = [{'; '.join(rows)}];")
+    lines += [
+        f"clbt.{name} = [{'; '.join(digits(np.atleast_1d(terms[name])))}];"
+        for name in _MOTION
+        if terms[name].any()
+    ]
     return {"": "\n".join(lines) + "\n"}
 
 
@@ -138,12 +157,8 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     for name, size in _SIZES.items():
         if name in matrices and matrices[name].size != size:
             raise InputError(where, f"{name} has {matrices[name].size} numbers, expected {size}")
-    strange = [name for name in _OTHERS if name in matrices and matrices[name].any()]
-    if strange:
-        raise InputError(
-            where,
-            f"found {', '.join(strange)}, for which inercal's triads have no place, expected zeros there",
-        )
+    if "Kap" in matrices and matrices["Kap"].any():
+        raise InputError(where, "found Kap, for which inercal has no place, expected zeros there")
     units = units_in(text)
     if "sf" not in matrices:
         units = {"acc": FORCE, "gyro": RATE} | units
@@ -157,12 +172,15 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
         "eb": matrices["eb"],
         "db": matrices["db"],
         "gSens": gSens,
+        **{name: matrices.get(name, np.zeros(3)) for name in ("Ka2", "rx", "ry", "rz")},
+        "tGA": np.array(matrices.get("tGA", np.zeros(1))[0]),
     }, units
 
 
 CONVENTION = Convention(
     name="psins",
-    equation="w = Kg sf_g gyro - eb - gSens sf_a acc [rad/s]; f = Ka sf_a acc - db [m/s^2]",
+    equation="w = Kg sf_g gyro - eb - gSens sf_a acc [rad/s]; f_1 = Ka sf_a acc - db - Ka2 (Ka sf_a acc)^2, "
+    "f = f_1 - fL(rx, ry, rz) - tGA w x f_1 [m/s^2]",
     suffixes=(".m",),
     si=True,
     terms=terms,

@@ -37,6 +37,12 @@ class Limits:
     """Rms angle [rad] between carried and measured verticals beyond which gyro and accelerometers contradict each
     other."""
 
+    rate_for_turns: float = 50.0
+    """Rate of samples [Hz] from which on a calibration as a strapdown unit is advised where poses say too little."""
+
+    rests_for_turns: int = 5
+    """Rests from which on it is."""
+
     outlier_risk: float = 5e-4
     """Accepted probability that a sound pose of a recording is named as outlying."""
 

@@ -26,7 +26,8 @@ def overlapping_variance(sums: Array, m: int) -> Array:
     ``sums`` (n + 1, *channels) are the `running_sums` of the samples. Riley and Howe, NIST SP 1065 (2008), section
     5.2.4.
     """
-    return _squares(sums, m) / (2.0 * m**2 * (len(sums) - 2 * m))
+    second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+    return np.asarray(np.einsum("i...,i...->...", second, second) / (2.0 * m**2 * len(second)))
 
 
 def equivalent_dof(n: int, m: int) -> float:
@@ -100,14 +101,9 @@ def fit_pooled(stretches: Sequence[Array], interval: float) -> AllanFit:
 def _pooled_variance(sums: Sequence[Array], m: int) -> Array:
     """Overlapping Allan variance (channels) over the stretches that are long enough, by the number of differences."""
     long_enough = [each for each in sums if len(each) > 2 * m]
-    count = sum(len(each) - 2 * m for each in long_enough)
-    return np.asarray(sum(_squares(each, m) for each in long_enough) / (2.0 * m**2 * count))
-
-
-def _squares(sums: Array, m: int) -> Array:
-    """Sum (*channels) of the squared second differences of running sums, ``m`` samples apart."""
-    second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
-    return np.asarray(np.einsum("i...,i...->...", second, second))
+    counts = [len(each) - 2 * m for each in long_enough]
+    whole = sum(n * overlapping_variance(each, m) for n, each in zip(counts, long_enough, strict=True))
+    return np.asarray(whole / sum(counts))
 
 
 def _terms(tau: Array) -> Array:

@@ -56,45 +56,47 @@ def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
 
 
 @kernel
-def add_interval(chain: Chain, k: int, m: int, H: Array, g: Array, row: Array, weighted: Array) -> None:
-    """Add the rows of interval k to H and g."""
-    n = len(g)
+def add_interval(
+    F: Array, G: Array, e: Array, W: Array, H: Array, g: Array, row: Array, weighted: Array
+) -> None:
+    """Add the rows of an interval, ``F`` (m, m), ``G`` (m, p), ``e`` (m,), ``W`` (m, m), to H and g."""
+    m, n = len(F), len(g)
     for a in range(m):
         for j in range(n):
             row[a, j] = 0.0
         for b in range(m):
-            row[a, b] = -chain.F[k, a, b]
+            row[a, b] = -F[a, b]
         row[a, m + 3 + a] = 1.0
         for b in range(n - 2 * m - 3):
-            row[a, 2 * m + 3 + b] = -chain.G[k, a, b]
+            row[a, 2 * m + 3 + b] = -G[a, b]
     for a in range(m):
         for j in range(n):
             total = 0.0
             for b in range(m):
-                total += chain.W[k, a, b] * row[b, j]
+                total += W[a, b] * row[b, j]
             weighted[a, j] = total
     for j in range(n):
         for a in range(m):
-            g[j] += weighted[a, j] * chain.e[k, a]
+            g[j] += weighted[a, j] * e[a]
             if row[a, j] != 0.0:
                 for i in range(n):
                     H[j, i] += row[a, j] * weighted[a, i]
 
 
 @kernel
-def add_node(chain: Chain, k: int, at: int, m: int, H: Array, g: Array) -> None:
-    """Add the rows of node k, whose state begins ``at``, to H and g."""
+def add_node(v: Array, angles: Array, known: Array, at: int, m: int, H: Array, g: Array) -> None:
+    """Add the rows of a node, whose state begins ``at``, to H and g; ``known`` (2,) is the information of its velocity
+    ``v`` (3,) and its ``angles`` (3,)."""
     for i in range(3):
-        H[at + 3 + i, at + 3 + i] += chain.velocity
-        g[at + 3 + i] -= chain.velocity * chain.v[k, i]
-        if chain.attitude > 0.0:
-            a, b = at + i, m + i
-            H[a, a] += chain.attitude
-            H[b, b] += chain.attitude
-            H[a, b] -= chain.attitude
-            H[b, a] -= chain.attitude
-            g[a] -= chain.attitude * chain.angles[k, i]
-            g[b] += chain.attitude * chain.angles[k, i]
+        H[at + 3 + i, at + 3 + i] += known[0]
+        g[at + 3 + i] -= known[0] * v[i]
+        a, b, attitude = at + i, m + i, known[1]
+        H[a, a] += attitude
+        H[b, b] += attitude
+        H[a, b] -= attitude
+        H[b, a] -= attitude
+        g[a] -= attitude * angles[i]
+        g[b] += attitude * angles[i]
 
 
 @kernel
@@ -123,17 +125,11 @@ def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
 
 
 @kernel
-def begun(chain: Chain, m: int, H: Array, g: Array) -> None:
-    """Set H and g to what is known of the first node and of the coefficients beforehand."""
-    n = len(g)
-    cleared(H, g, 0, n)
-    for i in range(m):
-        H[i, i] = chain.start[i]
-        g[i] = -chain.start[i] * chain.begin[i]
-    at = 2 * m + 3
-    for i in range(n - at):
-        H[at + i, at + i] = chain.prior[i]
-        g[at + i] = -chain.prior[i] * chain.c[i]
+def begun(information: Array, x: Array, at: int, H: Array, g: Array) -> None:
+    """Set in H and g what is known beforehand of the unknowns from ``at`` on, which deviate by ``x`` (q,)."""
+    for i in range(len(x)):
+        H[at + i, at + i] = information[i]
+        g[at + i] = -information[i] * x[i]
 
 
 @kernel
@@ -151,18 +147,21 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
     (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
     m, n, count = chain.F.shape[1], len(g), len(chain.rest)
     gone, row, weighted = np.zeros(n), np.zeros((m, n)), np.zeros((m, n))
-    begun(chain, m, H, g)
+    known = np.array([chain.velocity, chain.attitude])
+    cleared(H, g, 0, n)
+    begun(chain.start, chain.begin, 0, H, g)
+    begun(chain.prior, chain.c, 2 * m + 3, H, g)
     for k in range(count):
         starts = k == 0 or chain.rest[k] != chain.rest[k - 1]
         ends = k == count - 1 or chain.rest[k + 1] != chain.rest[k]
         if starts:
-            add_node(chain, k, 0, m, H, g)
+            add_node(chain.v[k], chain.angles[k], known, 0, m, H, g)
         for i in range(n):
             gone[i] = 0.0
         if k < count - 1:
-            add_interval(chain, k, m, H, g, row, weighted)
+            add_interval(chain.F[k], chain.G[k], chain.e[k], chain.W[k], H, g, row, weighted)
             if not ends:
-                add_node(chain, k + 1, m + 3, m, H, g)
+                add_node(chain.v[k + 1], chain.angles[k + 1], known, m + 3, m, H, g)
         eliminate(H, g, m + 3 if ends and chain.attitude > 0.0 else m, gone)
         kept(H, g, rows[k], right[k])
         moved_on(H, g, m, ends)
@@ -213,25 +212,25 @@ def completed(row: Array, i: int, Z: Array) -> None:
 
 
 @kernel
-def explained(chain: Chain, k: int, m: int, Z: Array, row: Array, out: Array, coupled: Array) -> None:
-    """Covariance ``out`` (m, m) of what the unknowns of covariance ``Z`` (n, n) say of interval k, A Z A^T, and that
-    ``coupled`` (m, p) with the coefficients, A Z."""
-    n = len(Z)
+def explained(F: Array, G: Array, Z: Array, row: Array, out: Array, coupled: Array) -> None:
+    """Covariance ``out`` (m, m) of what the unknowns of covariance ``Z`` (n, n) say of an interval of ``F`` (m, m) and
+    ``G`` (m, p), A Z A^T, and that ``coupled`` (m, p) with the coefficients, A Z."""
+    m, n = len(F), len(Z)
     for b in range(m):
         for j in range(n):
             # column j of A Z, row b
             value = Z[m + 3 + b, j]
             for i in range(m):
-                value -= chain.F[k, b, i] * Z[i, j]
+                value -= F[b, i] * Z[i, j]
             for i in range(n - 2 * m - 3):
-                value -= chain.G[k, b, i] * Z[2 * m + 3 + i, j]
+                value -= G[b, i] * Z[2 * m + 3 + i, j]
             row[j] = value
         for a in range(m):
             value = row[m + 3 + a]
             for i in range(m):
-                value -= chain.F[k, a, i] * row[i]
+                value -= F[a, i] * row[i]
             for i in range(n - 2 * m - 3):
-                value -= chain.G[k, a, i] * row[2 * m + 3 + i]
+                value -= G[a, i] * row[2 * m + 3 + i]
             out[a, b] = value
         for i in range(n - 2 * m - 3):
             coupled[b, i] = row[2 * m + 3 + i]
@@ -251,7 +250,7 @@ def followed(chain: Chain, rows: Array, Z: Array, out: Array, coupled: Array, no
         for i in range(first, -1, -1):
             completed(rows[k, i], i, Z)
         if not last:
-            explained(chain, k, m, Z, row, out[k], coupled[k])
+            explained(chain.F[k], chain.G[k], Z, row, out[k], coupled[k])
         for i in range(m + 3):
             for j in range(2 * m + 3, n):
                 nodes[k, i, j - 2 * m - 3] = Z[i, j]

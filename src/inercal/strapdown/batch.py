@@ -163,8 +163,9 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begun: 
         backward(nodes.rest, rows, right, step, x, angles)
         passes += 1
         size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-        if size < LIMITS.step or passes >= LIMITS.iterations or not np.isfinite(size):
-            converged = size < (LIMITS.step if passes < LIMITS.iterations else LIMITS.last_step)
+        enough = LIMITS.step if passes < LIMITS.patience else LIMITS.late_step
+        if size < enough or passes >= LIMITS.iterations or not np.isfinite(size):
+            converged = size < (enough if passes < LIMITS.iterations else LIMITS.last_step)
             break
         ahead = _longer(step, before, information)
         before = step if ahead == 1.0 else None

@@ -56,7 +56,20 @@ class Limits:
     over_earth_rate: float = 10.0
     """Mean rate at rest, over earth rate, from which on it is the bias that the fit begins with."""
 
-    step: float = 0.02
+    start_speed: float = 1.0
+    """Standard deviation [m/s] of the first velocity, of which the first node tells."""
+
+    unknown_heading: float = math.radians(10.0)
+    """Standard deviation [rad] of the first heading, beyond which the filter tries several, each as if it were known
+    to that."""
+
+    headings: int = 16
+    """Headings around the circle that it tries."""
+
+    filter_passes: int = 8
+    """Passes of the error-state filter at most."""
+
+    step: float = 0.005
     """Largest step, over the standard uncertainties of the coefficients, at which the iteration ends."""
 
     near: float = 30.0
@@ -65,9 +78,14 @@ class Limits:
     iterations: int = 30
     """Steps at most."""
 
+    patience: int = 10
+    """Steps after which a larger one ends the iteration, too: of a model that lacks much no more is to be had."""
+
+    late_step: float = 0.02
+    """That step, over the standard uncertainties."""
+
     last_step: float = 0.2
-    """Largest step, over the standard uncertainties, of the last of these at which the fit still counts: with a model
-    that lacks much, steps end in a small wandering."""
+    """Largest step, over the standard uncertainties, of the last of all, at which the fit still counts."""
 
     scoring: int = 60
     """Steps at most to the noise that a record shows, of one linear problem."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from inercal.records.record import Record, recorded_temperature
 from inercal.strapdown.batch import Fit
 from inercal.strapdown.budget import sources
 from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
+from inercal.strapdown.error_state import Filtered
 from inercal.strapdown.left_out import Tested, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.restricted import residuals
@@ -54,9 +56,18 @@ REFERENCES = (
 
 
 def assemble(
-    record: Record, samples: Samples, rests: tuple[Dwell, ...], fit: Fit, settings: StrapdownSettings
+    record: Record,
+    samples: Samples,
+    rests: tuple[Dwell, ...],
+    fit: Fit,
+    settings: StrapdownSettings,
+    by_filter: Filtered | None = None,
 ) -> Estimate:
-    """Put the estimate together."""
+    """Put the estimate together; of the filter, where there is one, in the place of the batch's coefficients: the
+    residuals of turns and the budget stay those of the batch."""
+    batch = fit
+    if by_filter is not None:
+        fit = replace(fit, c=by_filter.c, passes=by_filter.passes, converged=by_filter.converged)
     terms, outputs = settings.terms, _outputs(record)
     found = names(terms, settings.frame)
 
@@ -112,12 +123,13 @@ def assemble(
         [_unit(name, record) for name in found],
         values,
         uncertainty,
-        _verdict(fit, left, judged, statistics),
+        _verdict(fit, left, judged, statistics, settings.filter),
         findings=findings,
         statistics=statistics,
         result={
-            "estimator": "batch",
+            "estimator": settings.filter,
             "passes": fit.passes,
+            **({} if by_filter is None else _of_filter(batch, by_filter, in_words, J, found)),
             "frame": settings.frame,
             "unit": {sensor: record[f"{sensor}_x"].unit.symbol for sensor in ("acc", "gyro")},
             "rests": _times(rests, samples),
@@ -138,6 +150,38 @@ def assemble(
     )
 
 
+def _of_filter(
+    batch: Fit, by_filter: Filtered, in_words: Callable[[Array], Array], slope: Array, found: tuple[str, ...]
+) -> dict[str, Any]:
+    """Both estimators side by side, and u and the mean NIS of the filter after each rest."""
+
+    def side(c: Array, covariance: Array) -> dict[str, Any]:
+        u = np.sqrt(np.diag(slope @ covariance @ slope.T))
+        rows = zip(found, in_words(c[batch.free]).tolist(), u.tolist(), strict=True)
+        return {name: {"value": value, "u": each} for name, value, each in rows}
+
+    history = [
+        {"nis": nis, "u": dict(zip(found, np.sqrt(np.diag(slope @ P @ slope.T)).tolist(), strict=True))}
+        for nis, P in zip(by_filter.nis.tolist(), by_filter.history, strict=True)
+    ]
+    compare = {
+        "batch": side(batch.c, batch.covariance),
+        "error-state": side(by_filter.c, by_filter.covariance),
+    }
+    return {"compare": compare, "history": history}
+
+
+def failed(
+    record: Record, samples: Samples, rests: tuple[Dwell, ...], settings: StrapdownSettings
+) -> Estimate:
+    """The estimate where the filter runs off."""
+    text = 'the error-state filter ran off: take the batch (filter = "batch"), which holds where biases walk'
+    result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
+    return Estimate.without(
+        _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
+    )
+
+
 def useless(
     record: Record, samples: Samples, rests: tuple[Dwell, ...], settings: StrapdownSettings, force: float
 ) -> Estimate:
@@ -146,7 +190,7 @@ def useless(
         f"no solution was found; at rest the accelerometers read {force:.3g} m/s^2, expected about "
         f"{settings.site.gravity:.3g}: check units, signs and the order of axes"
     )
-    result = {"estimator": "batch", "rests": _times(rests, samples), "turns": []}
+    result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
     return Estimate.without(
         _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
     )
@@ -160,7 +204,7 @@ def too_few(
         f"found {counted(len(rests), 'rest')} of {LIMITS.shortest_rest:g} s or more, expected {LIMITS.fewest_rests} or "
         "more: let the unit stand still between the turns, or list the rests (rests.list)"
     )
-    result = {"estimator": "batch", "rests": _times(rests, samples), "turns": []}
+    result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
     return Estimate.without(
         _basis(record, settings), Status.TOO_FEW_INTERVALS, text, findings=record.findings, result=result
     )
@@ -251,7 +295,10 @@ def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[
     )
     hidden = [name for name in left if group_of(name) in ("size", "delay") and left[name] > HALF_SEEN]
     if hidden:
-        text += f"; {counted_names(hidden, 6)} cannot be told beside it and stay at their prior"
+        text += (
+            f"; {counted_names(hidden, 6)} cannot be told beside it and stay at their prior. Of rests in 10 poses or "
+            "more `inercal calibrate imu` with method multiposition tells the rest without velocities over turns"
+        )
     return [Finding("turn_noise", text)]
 
 
@@ -293,12 +340,17 @@ def _beyond_prior(found: tuple[str, ...], off: Array, prior_u: Array, u: Array) 
 
 
 def _verdict(
-    fit: Fit, left: Mapping[str, float], judged: Learned, statistics: Mapping[str, float]
+    fit: Fit, left: Mapping[str, float], judged: Learned, statistics: Mapping[str, float], estimator: str
 ) -> tuple[Status, str]:
     """Status and sentence."""
     from scipy.special import chdtri
 
     limit = float(chdtri(fit.dof, LIMITS.risk))
+    if not fit.converged and estimator == "error-state":
+        return Status.NOT_CONVERGED, (
+            f'after {fit.passes} passes of the filter the coefficients still move: take the batch (filter = "batch"), '
+            "which holds where biases walk"
+        )
     if not fit.converged:
         return Status.NOT_CONVERGED, (
             f"after {fit.passes} passes the coefficients still move: check units, signs and the order of axes, and "

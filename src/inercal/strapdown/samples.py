@@ -53,22 +53,20 @@ PAIRS: Final = _pairs()
 
 def delayed(x: Array, samples: float) -> Array:
     """Means (n, 3) over intervals that lie earlier by so many ``samples``, by a cubic through four of the running
-    sums."""
+    sums; the first and the last mean stand for those beyond."""
     whole = int(np.floor(samples))
     part = whole + 1.0 - samples  # 0 < part <= 1, after the second of the four points
-    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
-    reach = abs(whole) + 3
-    first, last = np.arange(reach, 0, -1)[:, None] * x[:1], np.arange(1, reach + 1)[:, None] * x[-1:]
-    sums = np.concatenate([sums[:1] - first, sums, sums[-1:] + last])
-    begin = reach - whole - 2
-    four = [sums[begin + k : begin + k + len(x) + 1] for k in range(4)]
     weights = (
         -part * (part - 1.0) * (part - 2.0) / 6.0,
         (part + 1.0) * (part - 1.0) * (part - 2.0) / 2.0,
         -(part + 1.0) * part * (part - 2.0) / 2.0,
         (part + 1.0) * part * (part - 1.0) / 6.0,
     )
-    return np.diff(sum(w * s for w, s in zip(weights, four, strict=True)), axis=0)
+    rows = np.arange(len(x)) - whole - 2
+    out = np.zeros_like(x)
+    for k, weight in enumerate(weights):  # steps of the sums are the means
+        out += weight * x[np.clip(rows + k, 0, len(x) - 1)]
+    return out
 
 
 def gains(c: Array) -> Gains:

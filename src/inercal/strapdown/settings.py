@@ -27,6 +27,7 @@ from inercal.keys import (
 from inercal.strapdown.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, USUAL, Frame
 from inercal.units import Quantity
 
+Estimator = Literal["batch", "error-state"]
 Term = Literal["k2", "size", "delay", "asymmetry", "g_sensitivity"]
 
 _MARGIN = within(0.0, math.inf, "a time of 0 or more")
@@ -236,6 +237,11 @@ class StrapdownSettings:
         "frame of the results: upper has z along the input axis of accelerometer z and y in the plane of y and z, "
         "lower has x along that of x and y in the plane of x and y",
         "upper",
+    )
+    filter: Estimator = option(
+        "estimator: batch takes all of the recording at once; error-state goes from rest to rest, in passes until it "
+        "is as good, for units whose biases hardly walk",
+        "batch",
     )
     terms: tuple[Term, ...] = USUAL
     time_base_u: float = quantity(

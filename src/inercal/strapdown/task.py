@@ -13,8 +13,9 @@ from inercal.estimate.result import Estimate, timed
 from inercal.records.dwells import Dwell
 from inercal.records.record import Record
 from inercal.strapdown.batch import Fit, fit
+from inercal.strapdown.error_state import filtered
 from inercal.strapdown.limits import LIMITS
-from inercal.strapdown.outcome import assemble, too_few, useless
+from inercal.strapdown.outcome import assemble, failed, too_few, useless
 from inercal.strapdown.reading import samples_of
 from inercal.strapdown.restricted import with_noise_shown
 from inercal.strapdown.rests import found_rests, mean_force, nodes_of
@@ -37,7 +38,10 @@ def load_kernels(settings: StrapdownSettings) -> None:
     """Load, or compile, all kernels that `calibrate` uses, so that they do not count in its time."""
     still = np.tile([0.0, 0.0, settings.site.gravity], (60, 1))
     samples = Samples(np.zeros((60, 3)), still, 0.1)
-    fit(samples, nodes_of(samples, (Dwell(0, 20), Dwell(40, 60)), 1.0), settings)
+    nodes = nodes_of(samples, (Dwell(0, 20), Dwell(40, 60)), 1.0)
+    fit(samples, nodes, settings)
+    if settings.filter == "error-state":
+        filtered(samples, nodes, settings)
 
 
 def calibrate(
@@ -73,6 +77,13 @@ def calibrate(
         return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
     progress("estimating noise")
     settings, fitted = with_noise_shown(samples, nodes, settings, fitted)
+    by_filter = None
+    if settings.filter == "error-state":
+        progress("filtering")
+        by_filter = filtered(samples, nodes, settings)
+        if by_filter is None:
+            estimate = failed(record, samples, rests, settings)
+            return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)
     progress("assembling")
-    estimate = assemble(record, samples, rests, fitted, settings)
+    estimate = assemble(record, samples, rests, fitted, settings, by_filter)
     return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)

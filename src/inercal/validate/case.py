@@ -47,13 +47,17 @@ SOURCES = {
     "leading order",
     "Tan 2021": "Tan et al. 2021, Large angle-of-attack measurement architecture for wind-tunnel models based on "
     "inertial technology: its figures, under the conditions in which they hold",
+    "PSINS": "PSINS (G. Yan, Northwestern Polytechnical University), record imusysclbt.bin of a unit in 19 positions, "
+    "simulated: the errors that were injected; limit: 0.3 u",
     "closed form": "a closed form or an identity that the case states",
     "truth": "the truth behind a simulation; limits from statistics",
 }
 
 
 #: the examples that cases use
-USED = ("xsens", "ferraris", "ferraris-si", "table", "lasergyro", "thermal", "selfcal", "sting")
+USED = (
+    "xsens", "ferraris", "ferraris-si", "table", "lasergyro", "thermal", "selfcal", "sting", "strapdown",
+)  # fmt: skip
 
 
 def record_of(name: str) -> Record:

@@ -28,6 +28,7 @@ SYSTEMS: Mapping[str, str] = {
     "foundation": "units, rotations, gravity, least squares",
     "noise": "Allan deviation and coefficients of noise",
     "imu": "calibration of IMUs, and conversion to other tools",
+    "strapdown": "calibration of strapdown units",
     "turntable": "sensitivity, design and calibration on a turntable",
     "selfcal": "self-calibration of a platform",
     "aoa": "angle of attack",

@@ -20,7 +20,7 @@ from inercal.imu.multiposition.joint import Joint, Scatter, noise_covariance, ty
 from inercal.imu.multiposition.outliers import linear_poses
 from inercal.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
 from inercal.imu.multiposition.squares import squares_source
-from inercal.imu.multiposition.verdict import rms_miss, verdict
+from inercal.imu.multiposition.verdict import by_turns, rms_miss, verdict
 from inercal.imu.recording import Recording
 from inercal.imu.second_order import k2_size
 from inercal.imu.settings import COMMAND, MASKED, ImuSettings
@@ -225,13 +225,14 @@ def without_fit(record: Record, recording: Recording, settings: ImuSettings) -> 
             f"found {counted(len(dwells), 'static interval')} of at least {window / recording.accelerometer.rate:.1f} "
             f"s at a threshold of {best:g} times the variance at rest, expected at least {LIMITS.fewest_poses}: hold "
             "the instrument still for 3 s or more in 12 to 40 different poses, each side up and the edges between"
+            f"{by_turns(recording, len(dwells))}"
         )
     else:
         status = Status.UNOBSERVABLE
         message = (
             f"the {len(dwells)} poses do not fix the nine coefficients of the accelerometers (the specific force lies "
             f"{spread_words(np.array([dwell.of(y).mean(axis=0) for dwell in dwells]))}): hold each side up, and the "
-            "edges between"
+            f"edges between{by_turns(recording, len(dwells))}"
         )
     return Estimate.without(
         _basis(record, settings),

@@ -69,7 +69,8 @@ def verdict(
             Status.ILL_CONDITIONED,
             f"the {len(poses.dwells)} poses hardly fix {term} ({number}; weak "
             f"combination {identified.weakest()}, condition {identified.condition:.0f}): add poses with the specific "
-            f"force along {pose_words(curing_pose(acc, gravity))} and its opposite",
+            f"force along {pose_words(curing_pose(acc, gravity))} and its opposite"
+            f"{by_turns(recording, len(poses.dwells))}",
         )
     if gyro is None and recording.gyro is not None:
         contradictions = [finding.message for finding in findings if finding.code == "contradiction"]
@@ -93,6 +94,21 @@ def verdict(
     return Status.OK, (
         f"{len(u)} coefficients from {len(poses.dwells)} poses and {len(gyro.miss)} turns; condition "
         f"{acc.fit.identifiability.condition:.1f} (accelerometers), {identified.condition:.1f} (gyro)"
+    )
+
+
+def by_turns(recording: Recording, rests: int) -> str:
+    """The other method, where a recording is fit for it: between rests in few poses the turns tell of the
+    accelerometers what poses by themselves do not."""
+    fit = (
+        recording.gyro is not None
+        and recording.accelerometer.rate >= LIMITS.rate_for_turns
+        and rests >= LIMITS.rests_for_turns
+    )
+    return (
+        "; or take `inercal calibrate strapdown`, which uses every sample of the turns between the rests"
+        if fit
+        else ""
     )
 
 

@@ -59,13 +59,15 @@ def needed_states(case: Case) -> Explained | None:
         walks, before = {*kinds} <= {*BIAS_WALK}, math.inf
         for factor in _FACTORS if {*BIAS_WALK} & {*kinds} else (1.0,):
             wider = _with_states(problem, kinds, factor)
-            if len(wider.names) == len(problem.names):
+            known = len(wider.names) == len(problem.names)
+            if known and (kinds != BIAS_WALK or factor == 1.0):
                 continue
             now = filtered((recording, wider))
             white = whiteness(regular(recording, now)) if sound(now) else 0.0
-            advice = f"name {named} in states under [model]"
-            if factor > 1.0:
-                advice += f", with {factor:g} times accelerometer_walk and gyro_walk under [noise]"
+            larger = f"{factor:g} times accelerometer_walk and gyro_walk under [noise]"
+            advice = f"state {larger}" if known else f"name {named} in states under [model]"
+            if factor > 1.0 and not known:
+                advice += f", with {larger}"
             if white > max(LIMITS.nearly_white, best.white if best else 0.0):
                 text = f"{words} explain the innovations: {advice}"
                 best = Explained(Finding("unmodelled", text, harm=EVERYTHING), white)
@@ -114,6 +116,7 @@ def _with_states(problem: FilterProblem, kinds: tuple[str, ...], factor: float) 
     )
     usual |= {"gyro_walk": noise.gyro_walk_sigma, "accelerometer_walk": noise.accelerometer_walk_sigma}
     names = tuple(name for name in ALL if name in prior or KIND_OF[name] in kinds)
-    sizes = np.array([prior.get(name, usual.get(KIND_OF[name], 0.0)) for name in names])
+    own = {name: size for name, size in prior.items() if KIND_OF[name] not in {*BIAS_WALK} & {*kinds}}
+    sizes = np.array([own.get(name, usual.get(KIND_OF[name], 0.0)) for name in names])
     vector = replace(problem.states, names=names)
     return replace(problem, noise=noise, prior=sizes, vector=vector)

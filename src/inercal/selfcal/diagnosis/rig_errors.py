@@ -19,6 +19,7 @@ from inercal.instruments.terms import shown_unit
 from inercal.selfcal.before.considered import innovation_slopes
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular
 from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.kinematics import axes_of
 from inercal.selfcal.platform.recording import Recording
@@ -50,6 +51,7 @@ _WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "levers": ("the accelerometers are not at the centre of the gimbals", ""),
     "scale_asymmetry": ("the scale of the gyros is not the same both ways", ""),
     "g_sensitivity": ("the gyros drift by specific force", ""),
+    "harmonics": ("the encoders err periodically with their angles", ""),
     "sag": ("gravity turns the sensors on the platform", ""),
     "kg0_T1": ("the gyro biases change with temperature", ""),
     "ka0_T1": ("the accelerometer biases change with temperature", ""),
@@ -70,7 +72,8 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     recording, problem = case
     still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
     about_axes = axes_of(recording.th[0], problem.world.axes, problem.world.signs)
-    left_out = twins(tuple(_WORDS), np.flatnonzero(still).tolist(), about_axes.tolist())
+    hidden = twins(tuple(_WORDS), np.flatnonzero(still).tolist(), about_axes.tolist())
+    left_out = {*hidden, *_unturned(recording, problem)}
     kinds = dict[str, tuple[str, ...]]()
     for kind in _WORDS:
         names = tuple(name for name in STATES[kind].parameters if name not in left_out)
@@ -89,6 +92,18 @@ def rig_errors(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
     wanders = kept(lambda case: _columns_by(about, case, [(wave, names) for wave in _waves(case[0])]))
     for k, of in enumerate(constant):
         yield _wander(of, wanders, slice(3 * k, 3 * k + 3))
+
+
+def _unturned(recording: Recording, problem: FilterProblem) -> tuple[str, ...]:
+    """Harmonics that cannot be told from a constant, as their joints turn by less than half a period; and those for
+    which the study names no wave."""
+    turned, waves = (
+        np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0),
+        problem.states.harmonics,
+    )
+    names = STATES["harmonics"].parameters
+    few = [k for k, (joint, order) in enumerate(waves) if order * turned[joint] < np.pi]
+    return *names[2 * len(waves) :], *(name for k in few for name in names[2 * k : 2 * k + 2])
 
 
 def _together(about: Judged, names: tuple[str, ...]) -> Columns:

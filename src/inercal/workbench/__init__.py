@@ -1,0 +1,1 @@
+"""The workbench: the commands in a browser, on the machine of the user, without any network."""

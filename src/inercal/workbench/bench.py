@@ -1,0 +1,189 @@
+"""The bench, which pages and REST call: sessions, jobs, recordings looked at, results."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from inercal._files import write_text
+from inercal.errors import InercalError, InputError
+from inercal.workbench.jobs import Job, Queue
+from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions
+
+if TYPE_CHECKING:
+    from inercal.face.result import Result
+    from inercal.records.record import Record
+    from inercal.workbench.charts import Course
+
+_HELD = 2
+"""Recordings that are held in memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """A recording that was read: the record, its channels as they are drawn, and the command that inspects it."""
+
+    record: Record
+    courses: tuple[Course, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A work folder: its sessions, its queue of jobs, and the store for what is kept, the user's own if None."""
+
+    root: Path
+    sessions: Sessions
+    queue: Queue
+    store: str | None = None
+    _looked: OrderedDict[tuple[Any, ...], Looked] = field(default_factory=OrderedDict, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    def look(self, session: Session) -> Looked:
+        """Read the recordings of a session; raises `InputError`. The last few are held."""
+        from inercal.records.read import read
+        from inercal.workbench.charts import courses
+
+        files = [*session.recordings, *filter(None, [session.map])]
+        if not session.recordings:
+            raise InputError(session.title, "found no recording, expected one")
+        key = tuple((str(path), path.stat().st_mtime_ns, path.stat().st_size) for path in files)
+        with self._lock:  # one at a time: a recording may take much memory
+            if key not in self._looked:
+                while len(self._looked) >= _HELD:
+                    self._looked.popitem(last=False)
+                record = read(session.recordings, session.map)
+                self._looked[key] = Looked(record, courses(record))
+            self._looked.move_to_end(key)
+            return self._looked[key]
+
+    def arrived(self, session: Session, path: Path) -> Session:
+        """The session with the kind of a study that has come; raises `StudyError` where that cannot be read."""
+        from inercal.face.study import kind_of
+
+        return self.sessions.of_kind(session, kind_of(path)) if path.name == STUDY else session
+
+    def begin_study(self, session: Session, kind: str | None = None, rate: str | None = None) -> Session:
+        """Write a study, and a guessed map, for the recordings of a session; those there are replaced.
+
+        Raises `InputError` where the recordings cannot be read or the kind is none.
+        """
+        from inercal.face.beginning import begun, kind_of_record
+
+        names = session.recordings
+        known = kind_of_record(names) if kind is None else kind
+        session = self.sessions.of_kind(session, known)
+        study, column_map = begun(known, names, Path(STUDY), Path(MAP), rate)  # type: ignore[arg-type]
+        write_text(session.folder / STUDY, study)
+        if column_map is not None:
+            write_text(session.folder / MAP, column_map)
+        return session
+
+    def run(self, session: Session) -> Job:
+        """Put the calibration of a session into the queue; raises `InputError` where a part is missing."""
+        words = session.command(Path("{out}/result.json"), Path("{out}/report.html"))
+        return self.queue.add(session.id, session.folder, words)
+
+    def result(self, job: Job) -> Result:
+        """The result of a job; raises `InputError` where there is none."""
+        from inercal.face.calibrations import load
+
+        if job.result is None:
+            raise InputError(f"job {job.id}", f"has no result, it is {job.state.value}")
+        return load(job.result)
+
+    def keep(self, job: Job, instrument: str = "") -> Job:
+        """Put into the queue that the result of a job, with its report, is kept in the store."""
+        words = ["keep", self._result_of(job)]
+        words += ["--report", os.path.relpath(job.report, job.where)] if job.report else []
+        words += ["--instrument", instrument] if instrument else []
+        words += ["--store", self.store] if self.store else []
+        return self.queue.add(job.session, job.where, words)
+
+    @property
+    def lab(self) -> Path:
+        """The statements of the laboratory in its certificates."""
+        return self.root / "lab.toml"
+
+    def state(self, text: str) -> None:
+        """Write what the laboratory states; raises `InputError` where it is not so that a certificate can say it."""
+        from inercal.laboratory.certificate.lab import read_lab
+
+        with tempfile.TemporaryDirectory(dir=self.root) as folder:
+            trial = Path(folder) / self.lab.name
+            write_text(trial, text)
+            read_lab(trial)
+        write_text(self.lab, text)
+
+    def certify(self, job: Job, number: str) -> Job:
+        """Put into the queue that a certificate is written of the result of a job."""
+        words = [
+            "certificate",
+            self._result_of(job),
+            "--lab",
+            os.path.relpath(self.lab, job.where),
+            "--number",
+            number,
+        ]
+        words += ["--page", os.path.relpath(job.report, job.where)] if job.report else []
+        words += ["--html", "{out}/certificate.html", "--out", "{out}/certificate.xml"]
+        words += ["--store", self.store] if self.store else []
+        return self.queue.add(job.session, job.where, words)
+
+    def compare(self, before: Job, after: Job) -> Job:
+        """Put into the queue that two results of one instrument are compared."""
+        words = [
+            "compare",
+            os.path.relpath(before.folder / "result.json", after.where),
+            self._result_of(after),
+        ]
+        words += ["--out", "{out}/result.json", "--report", "{out}/report.html"]
+        return self.queue.add(after.session, after.where, words)
+
+    def _result_of(self, job: Job) -> str:
+        """The file of a result, as from the folder of its session; raises `InputError`."""
+        if job.result is None:
+            raise InputError(f"job {job.id}", f"has no result, it is {job.state.value}")
+        return os.path.relpath(job.result, job.where)
+
+    def last_job(self, session: Session) -> Job | None:
+        """The newest calibration of a session, None without any."""
+        return next((job for job in self.queue if job.session == session.id and job.calibrates), None)
+
+    def close(self) -> None:
+        """End the running job."""
+        self.queue.close()
+
+
+def open_bench(root: Path, store: str | None = None) -> Bench:
+    """The bench of a work folder, which is made where it is not there; raises `InputError`."""
+    try:
+        (root / "sessions").mkdir(parents=True, exist_ok=True)
+        for part in root.glob(f"sessions/*/.*{PART}"):  # of uploads that a crash cut off
+            part.unlink(missing_ok=True)
+        return Bench(root, Sessions(root / "sessions"), Queue(root / "jobs"), store)
+    except OSError as error:
+        raise InputError(root, f"cannot be made a work folder ({error.strerror})") from error
+
+
+def said_of(error: BaseException) -> str:
+    """The words of an error for a page."""
+    if isinstance(error, InercalError):
+        return str(error)
+    return f"unexpected {type(error).__name__} ({error}), a fault of inercal's own: please report it"
+
+
+KINDS: Mapping[str, str] = {
+    "imu": "IMU by hand, on its sides, or on a table",
+    "strapdown": "strapdown unit in rests and turns",
+    "turntable": "instrument on a turntable",
+    "selfcal": "platform in gimbals",
+    "aoa": "wind-tunnel model on a sting",
+}
+"""Kinds of study in words, in the order of the commands."""
+assert KINDS.keys() == COMMANDS.keys()

@@ -1,0 +1,266 @@
+"""Jobs of the workbench: commands in processes of their own, one after the other, kept in a folder each.
+
+A job survives its page, for the page only looks. It ends with the program; begun anew, that finds it again, done or
+interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from inercal._files import read_bytes, write_text
+from inercal.errors import InputError
+
+_ABOUT, _LAST = "job.json", 20_000
+_PATIENCE = 5.0
+"""Time [s] after which a cancelled command that goes on is killed."""
+
+
+class State(StrEnum):
+    """The state of a job."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    DONE = "done"
+    REFUSED = "refused"
+    CANCELLED = "cancelled"
+    INTERRUPTED = "interrupted"
+
+
+ENDED = frozenset({State.DONE, State.REFUSED, State.CANCELLED, State.INTERRUPTED})
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job: its number and folder, the session it is of, the arguments of its command, and what became of it.
+
+    ``code`` is the exit code, None before the end: 0 ok, 1 a bad verdict, 2 refused.
+    """
+
+    id: str
+    folder: Path
+    session: str
+    arguments: tuple[str, ...]
+    where: Path
+    state: State
+    made: str
+    code: int | None = None
+
+    @property
+    def command(self) -> str:
+        """The command as one would type it in the folder of the session."""
+        return shlex.join(["inercal", *self.arguments])
+
+    @property
+    def calibrates(self) -> bool:
+        """True for a calibration, as against what is done with its result."""
+        return self.arguments[0] in ("calibrate", "selfcal", "aoa")
+
+    @property
+    def result(self) -> Path | None:
+        """The file of its result, None before there is one."""
+        return path if (path := self.folder / "result.json").is_file() else None
+
+    @property
+    def report(self) -> Path | None:
+        """The page of its result, None before there is one."""
+        return path if (path := self.folder / "report.html").is_file() else None
+
+    @property
+    def said(self) -> str:
+        """The words of the command to people."""
+        return _text(self.folder / "said")
+
+    @property
+    def progress(self) -> str:
+        """The last words of the command on its way."""
+        lines = _text(self.folder / "progress").splitlines()
+        return lines[-1] if lines else ""
+
+
+def _text(path: Path) -> str:
+    """The last part of a text that may not be there."""
+    try:
+        return path.read_bytes()[-_LAST:].decode(errors="replace")
+    except OSError:
+        return ""
+
+
+class Queue:
+    """The jobs of a folder, of which one runs at a time, begun in the order in which they came."""
+
+    def __init__(self, root: Path) -> None:
+        root.mkdir(parents=True, exist_ok=True)
+        self.root = root
+        self._changed = threading.Condition()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._running: str | None = None
+        self._closed = False
+        self._jobs = {job.id: job for job in map(_found, sorted(root.iterdir())) if job is not None}
+        for job in self._jobs.values():
+            self._put(job)
+        self._thread = threading.Thread(target=self._work, name="jobs", daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Any:
+        """The jobs, the newest first."""
+        with self._changed:
+            return iter(sorted(self._jobs.values(), key=lambda job: job.id, reverse=True))
+
+    def get(self, number: str) -> Job:
+        """The job of that number; raises `InputError` where there is none."""
+        with self._changed:
+            if number not in self._jobs:
+                raise InputError(f"job {number}", "found none, expected one of the list")
+            return self._jobs[number]
+
+    def folder_of(self, number: int) -> Path:
+        """The folder of a job."""
+        return self.root / f"{number:05d}"
+
+    def add(self, session: str, where: Path, arguments: Sequence[str]) -> Job:
+        """A new job at the end of the queue; ``{out}`` in its arguments is its own folder, as seen from ``where``."""
+        with self._changed:
+            number = max((int(each) for each in self._jobs), default=0) + 1
+            folder = self.folder_of(number)
+            folder.mkdir()
+            words = tuple(word.replace("{out}", os.path.relpath(folder, where)) for word in arguments)
+            made = datetime.now(UTC).isoformat(timespec="seconds")
+            job = Job(folder.name, folder, session, words, where, State.WAITING, made)
+            self._put(job)
+            self._changed.notify_all()
+            return job
+
+    def again(self, number: str) -> Job:
+        """The same command as a new job."""
+        old = self.get(number)
+        own = os.path.relpath(old.folder, old.where)
+        return self.add(old.session, old.where, [word.replace(own, "{out}") for word in old.arguments])
+
+    def cancel(self, number: str) -> Job:
+        """Take a job out of the queue, or end its process."""
+        with self._changed:
+            job = self.get(number)
+            if job.state in ENDED:
+                return job
+            job = replace(job, state=State.CANCELLED)
+            self._put(job)
+            process = self._process if self._running == number else None
+        if process is not None:
+            process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(_PATIENCE)
+            process.kill()
+        return job
+
+    def wait(self, number: str, timeout: float | None = None) -> Job:
+        """The job once it has ended, or as it is after ``timeout`` [s]."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._jobs[number].state in ENDED and self._running != number, timeout
+            )
+            return self._jobs[number]
+
+    def close(self) -> None:
+        """End the running job, and begin no more."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+            process = self._process
+        if process is not None:
+            process.kill()
+        self._thread.join()
+
+    def _put(self, job: Job) -> None:
+        """Keep what a job is, in memory and on the disk."""
+        self._jobs[job.id] = job
+        about = {
+            "session": job.session,
+            "arguments": job.arguments,
+            "where": str(job.where),
+            "state": job.state.value,
+            "made": job.made,
+            "code": job.code,
+        }
+        write_text(job.folder / _ABOUT, json.dumps(about) + "\n")
+
+    def _work(self) -> None:
+        """Run the jobs that wait, one by one."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._next() is not None)
+                job = self._next()
+                if self._closed or job is None:
+                    return
+                job = replace(job, state=State.RUNNING)
+                self._put(job)
+                try:
+                    process = _begun(job)
+                except OSError as error:  # its folder has gone, or there is no room for another process
+                    write_text(job.folder / "said", f"inercal: error: {error.filename}: {error.strerror}\n")
+                    self._put(replace(job, state=State.REFUSED, code=2))
+                    self._changed.notify_all()
+                    continue
+                self._process, self._running = process, job.id
+            process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
+            with self._changed:
+                self._process, self._running = None, None
+                job = self._jobs[job.id]
+                if job.state is State.RUNNING:
+                    self._put(_ended(job))
+                self._changed.notify_all()
+
+    def _next(self) -> Job | None:
+        """The job that has waited longest."""
+        return next((job for _, job in sorted(self._jobs.items()) if job.state is State.WAITING), None)
+
+
+def _begun(job: Job) -> subprocess.Popen[bytes]:
+    """The process of a job."""
+    with open(job.folder / "said", "wb") as said, open(job.folder / "printed", "wb") as printed:
+        return subprocess.Popen(
+            [sys.executable, "-m", "inercal.workbench.child", str(job.folder), *job.arguments],
+            cwd=job.where,
+            stdin=subprocess.PIPE,
+            stdout=printed,
+            stderr=said,
+        )
+
+
+def _ended(job: Job) -> Job:
+    """A job whose process has gone: done or refused where it left an exit code, else interrupted."""
+    try:
+        code = int(read_bytes(job.folder / "end"))
+    except (OSError, ValueError):
+        return replace(job, state=State.INTERRUPTED)
+    return replace(job, state=State.DONE if code in (0, 1) else State.REFUSED, code=code)
+
+
+def _found(folder: Path) -> Job | None:
+    """The job of a folder, as the program that ended left it; None where it is none."""
+    try:
+        about = json.loads(read_bytes(folder / _ABOUT))
+        state = State(about["state"])
+        job = Job(
+            folder.name, folder, about["session"], tuple(about["arguments"]), Path(about["where"]), state,
+            about["made"], about["code"],
+        )  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    if state is State.RUNNING:
+        return _ended(job)
+    return job

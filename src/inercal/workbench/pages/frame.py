@@ -1,0 +1,119 @@
+"""The frame of all pages: head, ways to the others, the words of an error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence, Set
+from contextlib import contextmanager
+
+from nicegui import ui
+
+from inercal.workbench.bench import said_of
+from inercal.workbench.jobs import Job
+from inercal.workbench.sessions import Session
+
+_STEPS = (("recording", "Recording"), ("study", "Study"), ("run", "Run"), ("result", "Result"))
+_PLACES = (("/", "Home"), ("/instruments", "Instruments"), ("/validation", "Validation"))
+
+
+@contextmanager
+def framed(title: str, session: Session | None = None, step: str = "") -> Iterator[None]:
+    """A page with its head; of a session with the ways to its steps."""
+    ui.page_title(f"{title} - inercal")
+    ui.colors(primary="#2F6690", negative="#C03A2B", positive="#1E7A4C")
+    ui.add_head_html('<link rel="stylesheet" href="/static/bench.css">')
+    ui.add_head_html('<script src="/static/bench.js" defer></script>')
+    dark = ui.dark_mode(value=None)
+    with ui.element("nav").props('aria-label="pages"').classes("w-full flex gap-4 items-center"):
+        ui.label("inercal workbench").classes("font-bold")
+        for target, words in _PLACES:
+            _way(target, words, words == title)
+        ui.space()
+        button("Light", dark.disable)
+        button("Dark", dark.enable)
+    if session is not None:
+        with ui.element("nav").props('aria-label="steps"').classes("w-full flex gap-4"):
+            for name, words in _STEPS:
+                _way(f"/sessions/{session.id}/{name}", words, name == step)
+    with ui.element("main").classes("w-full flex flex-col gap-3"):
+        with ui.element("h1"):
+            ui.label(title)
+        yield
+        _words_of_uploads()
+
+
+def _way(target: str, words: str, here: bool) -> None:
+    """A link to a page, marked where one is."""
+    link = ui.link(words, target)
+    if here:
+        link.props('aria-current="page"').classes("font-bold no-underline")
+
+
+def _words_of_uploads() -> None:
+    """The line that says how far an upload is."""
+    ui.element("div").props('id=upload-words aria-live="polite"').classes("quiet")
+
+
+def refused(error: BaseException) -> None:
+    """Show why something cannot be done."""
+    ui.label(said_of(error)).classes("bad").props('role="alert"')
+
+
+@contextmanager
+def told() -> Iterator[None]:
+    """Tell an error of what a button does in a message on the page."""
+    try:
+        yield
+    except Exception as error:
+        ui.notify(said_of(error), type="negative", multi_line=True, close_button="Close", timeout=0)
+
+
+def command(words: str) -> None:
+    """The command that does the same, to copy."""
+    with ui.row(wrap=False).classes("items-center w-full"):
+        ui.label(words).classes("command grow").props('data-command="1"')
+        button("Copy", lambda: ui.clipboard.write(words))
+
+
+def button(words: str, act: Callable[[], object], label: str = "", main: bool = False) -> ui.button:
+    """A button that does something; the ``main`` one of a page is filled. ``label`` says more than its words."""
+    made = ui.button(words, on_click=act, color=None).props("no-caps unelevated")
+    made.classes("act main self-start" if main else "act self-start")
+    if label:
+        made.props(f'aria-label="{label}"')
+    return made
+
+
+def report(job: Job, title: str) -> None:
+    """The page that a job wrote, in a frame of its own: it may hold names from a foreign file."""
+    ui.element("iframe").props(
+        f'src="/api/v1/jobs/{job.id}/files/report.html" title="{title}" sandbox="allow-scripts allow-popups"'
+    ).classes("report")
+
+
+def heading(words: str) -> None:
+    """The head of a part of a page."""
+    with ui.element("h2"):
+        ui.label(words)
+
+
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[str | Callable[[], object]]], numbers: Set[int] = frozenset()
+) -> None:
+    """A table of texts, or of what a callback makes; columns of ``numbers`` end at the right."""
+    place = (
+        ui.element("div").classes("scroll").props(f'tabindex=0 role="region" aria-label="table by {head[0]}"')
+    )
+    with place, ui.element("table").classes("plain"):
+        with ui.element("thead"), ui.element("tr"):
+            for k, words in enumerate(head):
+                with ui.element("th").props('scope="col"').classes("number" if k in numbers else ""):
+                    ui.label(words)
+        with ui.element("tbody"):
+            for row in rows:
+                with ui.element("tr"):
+                    for k, cell in enumerate(row):
+                        with ui.element("td").classes("number" if k in numbers else ""):
+                            if callable(cell):
+                                cell()
+                            else:
+                                ui.label(cell)

@@ -1,0 +1,181 @@
+"""Result: the verdict first, then the picture, coefficients with U, budget, findings; kept, certified, handed on."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import ui
+
+from inercal._files import read_bytes
+from inercal.errors import InercalError
+from inercal.estimate.rounding import rounded
+from inercal.face.result import Result
+from inercal.findings import Status
+from inercal.workbench.bench import Bench
+from inercal.workbench.jobs import Job, State
+from inercal.workbench.pages.frame import button, command, framed, heading, refused, report, table, told
+
+
+def add(bench: Bench) -> None:
+    """Add the page."""
+
+    @ui.page("/sessions/{number}/result")
+    async def show(number: str) -> None:
+        session = bench.sessions.get(number)
+        with framed("Result", session, "result"):
+            job = bench.last_job(session)
+            if job is None or job.result is None:
+                ui.label("There is no result yet: run the session first.")
+                return
+            try:
+                result = await asyncio.to_thread(bench.result, job)
+            except InercalError as error:
+                refused(error)
+                return
+            _verdict(result)
+            if job.report is not None:
+                report(job, "report")
+            _coefficients(result)
+            _budget(result)
+            heading("Take it along")
+            with ui.row():
+                for name, words in (("result.json", "Result (JSON)"), ("report.html", "Report (HTML)")):
+                    if (job.folder / name).is_file():
+                        ui.link(words, f"/api/v1/jobs/{job.id}/files/{name}", new_tab=True)
+            _compared(bench, job)
+            _kept(bench, job)
+            _certificate(bench, job)
+            heading("The same from the command line")
+            command(job.command)
+
+
+_COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
+
+
+def _verdict(result: Result) -> None:
+    """The verdict in its colour, and what was found."""
+    ui.label(f"{result.status.value}: {result.message}").classes(
+        "verdict " + _COLOURS.get(result.status, "bad")
+    ).props('data-verdict="1"')
+    if result.findings:
+        with ui.expansion(f"{len(result.findings)} findings", value=result.status is not Status.OK).classes(
+            "w-full"
+        ):
+            for finding in result.findings:
+                where = f" ({finding.where})" if finding.where else ""
+                ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+
+
+def _coefficients(result: Result) -> None:
+    """The coefficients with U, in the units of the command line."""
+    if not result.names:
+        return
+    heading("Coefficients")
+    rows = []
+    for parameter in result.view.shown.parameters.values():
+        value, u, expanded = rounded(parameter.value, parameter.u, parameter.U)[:3]
+        rows.append([parameter.name, value, u, expanded, f"{parameter.k:.2f}", parameter.unit])
+    table(["Name", "Value", "u", "U", "k", "Unit"], rows, {1, 2, 3, 4})
+
+
+def _budget(result: Result) -> None:
+    """The sources of the uncertainty."""
+    shares: dict[str, float] = {}
+    for item in result.estimate.budget:
+        shares[item.source] = max(shares.get(item.source, 0.0), max(item.share.values(), default=0.0))
+    if shares:
+        heading("Where the uncertainty comes from")
+        ordered = sorted(shares.items(), key=lambda each: -each[1])
+        table(
+            ["Source", "Largest share of a variance"],
+            [[name, f"{100 * share:.0f} %"] for name, share in ordered[:12]],
+            {1},
+        )
+
+
+def _compared(bench: Bench, job: Job) -> None:
+    """Set the result beside another of the same kind."""
+    others = {
+        each.id: f"job {each.id}, {bench.sessions.get(each.session).title}, {each.made[:16]}"
+        for each in bench.queue
+        if each.calibrates and each.result is not None and each.id != job.id
+    }
+    if not others:
+        return
+    heading("Beside another result")
+    chosen = ui.select(others, label="Earlier result").classes("w-96 max-w-full")
+    place = ui.element("div").classes("w-full")
+
+    async def compare() -> None:
+        with told():
+            asked = bench.compare(bench.queue.get(chosen.value), job)
+            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
+            place.clear()
+            if ended.report is None:
+                _say(ended, "")
+                return
+            with place:
+                report(ended, "comparison")
+                command(ended.command)
+
+    button("Compare", compare)
+
+
+def _kept(bench: Bench, job: Job) -> None:
+    """Keep the result in the store of the laboratory."""
+    heading("Keep it")
+    name = ui.input("Instrument: maker, model, serial (if the study does not say)").classes("w-96 max-w-full")
+
+    async def keep() -> None:
+        with told():
+            asked = bench.keep(job, name.value or "")
+            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
+            _say(ended, "It is kept.")
+
+    button("Keep", keep)
+
+
+def _certificate(bench: Bench, job: Job) -> None:
+    """Write a certificate, with what the laboratory states."""
+    from inercal.laboratory.certificate.lab import lab_template
+
+    heading("Certificate")
+    text = read_bytes(bench.lab).decode() if bench.lab.is_file() else lab_template()
+    with ui.expansion("What the laboratory states (lab.toml)", value=not bench.lab.is_file()).classes(
+        "w-full"
+    ):
+        editor = (
+            ui.textarea(value=text).props('outlined autogrow aria-label="lab.toml"').classes("w-full command")
+        )
+
+        def state() -> None:
+            with told():
+                bench.state(editor.value)
+                ui.notify("The statements of the laboratory are kept.")
+
+        button("Save lab.toml", state)
+    number = ui.input("Number of the certificate")
+    links = ui.row()
+
+    async def certify() -> None:
+        with told():
+            asked = bench.certify(job, number.value or "")
+            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
+            _say(ended, "The certificate is written.")
+            if ended.code == 0:
+                links.clear()
+                with links:
+                    for file, words in (("certificate.xml", "XML"), ("certificate.html", "page")):
+                        ui.link(
+                            f"Certificate, {words}", f"/api/v1/jobs/{ended.id}/files/{file}", new_tab=True
+                        )
+
+    button("Write the certificate", certify)
+
+
+def _say(job: Job, words: str) -> None:
+    """Tell how a job has ended that one waited for."""
+    good = job.state is State.DONE and job.code == 0
+    said = job.said.strip() or job.state.value
+    ui.notify(words if good else said, type="positive" if good else "negative", multi_line=True, close_button="Close",
+              timeout=5000 if good else 0)  # fmt: skip

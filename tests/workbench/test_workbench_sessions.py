@@ -1,0 +1,116 @@
+"""Sessions: files land in their folder under a harmless name, whole or not at all; TOML becomes map or study."""
+
+import asyncio
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from inercal.errors import InputError
+from inercal.examples import EXAMPLES
+from inercal.workbench import sessions as module
+from inercal.workbench.sessions import COMMANDS, MAP, STUDY, Sessions, receive, safe_name
+
+
+@pytest.fixture
+def sessions(tmp_path):
+    return Sessions(tmp_path / "sessions")
+
+
+def sent(session, name, *pieces):
+    async def body():
+        for piece in pieces:
+            yield piece
+
+    return asyncio.run(receive(session, name, body()))
+
+
+HOSTILE = [
+    "../../etc/passwd",
+    "..\\..\\x.csv",
+    "/etc/shadow",
+    "a\0b.csv",
+    "<img src=x>.csv",
+    "-rf.csv",
+    "x" * 400 + ".csv",
+]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_name_lands_in_the_folder(sessions, name):
+    session = sessions.begin("test")
+    path = sent(session, name, b"t,acc_x\n")
+    assert path.parent == session.folder
+    assert not path.name.startswith(("-", "."))
+    assert not {*'<>:"|?*/\\\0'} & {*path.name}
+
+
+@pytest.mark.parametrize("name", ["", "..", "/", "session.json", "CON", "nul.csv", " . "])
+def test_a_name_of_nothing_or_of_the_system_is_refused(sessions, name):
+    with pytest.raises(InputError, match="file name"):
+        sent(sessions.begin("test"), name, b"x")
+
+
+@given(st.text(max_size=300))
+def test_any_name_is_refused_or_safe_and_stays_as_it_is_the_second_time(text):
+    try:
+        name = safe_name(text)
+    except InputError:
+        return
+    assert len(name) <= 121
+    assert safe_name(name) == name
+
+
+def test_an_upload_beyond_the_limit_leaves_nothing(sessions, monkeypatch):
+    monkeypatch.setattr(module, "LARGEST", 10)
+    session = sessions.begin("test")
+    assert sent(session, "at.csv", b"12345", b"67890").stat().st_size == 10
+    with pytest.raises(InputError, match="found more than"):
+        sent(session, "over.csv", b"12345", b"678901")
+    assert [path.name for path in session.folder.iterdir() if "over" in path.name] == []
+
+
+def test_an_upload_that_breaks_off_leaves_what_was_there(sessions):
+    session = sessions.begin("test")
+    sent(session, "log.csv", b"before")
+
+    async def broken():
+        yield b"half"
+        raise ConnectionError
+
+    with pytest.raises(ConnectionError):
+        asyncio.run(receive(session, "log.csv", broken()))
+    assert (session.folder / "log.csv").read_bytes() == b"before"
+    assert session.recordings == [session.folder / "log.csv"]
+
+
+def test_a_toml_file_is_the_map_or_the_study(sessions):
+    session = sessions.begin("test")
+    assert sent(session, "any.toml", b'[columns.t]\nfrom = "t"\nunit = "s"\n').name == MAP
+    assert sent(session, "other.toml", b'[site]\nlatitude = "45 deg"\n').name == STUDY
+    with pytest.raises(InputError):
+        sent(session, "broken.toml", b"[[[")
+    assert session.recordings == []
+
+
+def test_examples_begin_sessions_whose_commands_are_theirs(sessions, tmp_path):
+    words = {" ".join(command) for command in COMMANDS.values()}
+    for example in EXAMPLES.values():
+        if example.verb in words and len(example.records) < 3:
+            session = sessions.begin_with(example.name)
+            arguments = session.command(tmp_path / "o.json", tmp_path / "r.html")
+            assert " ".join(arguments).startswith(example.verb)
+            assert {path.name for path in session.recordings} == {*example.records}
+            assert ("--map" in arguments) == (example.map is not None)
+
+
+def test_sessions_are_numbered_found_again_and_dropped(sessions):
+    first, second = sessions.begin("one"), sessions.begin("two", "aoa")
+    assert [session.title for session in sessions] == ["two", "one"]
+    assert sessions.get(second.id).kind == "aoa"
+    sessions.drop(first)
+    assert [session.id for session in sessions] == [second.id]
+    assert sessions.begin("three").id > second.id
+    for wrong in ("0009", "../jobs", "x"):
+        with pytest.raises(InputError):
+            sessions.get(wrong)
