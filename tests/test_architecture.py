@@ -154,8 +154,8 @@ WITHIN = {
         "known_turns ferraris aided temperature task figures"
     ),
     "strapdown": (
-        "limits coefficients settings kernels samples arrow simulate rests start batch error_state bounds path_search "
-        "design budget left_out restricted reading outcome task figures"
+        "limits coefficients settings kernels delay samples arrow simulate rests start batch error_state bounds "
+        "path_search design budget left_out restricted reading outcome task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "

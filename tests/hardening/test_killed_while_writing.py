@@ -379,6 +379,7 @@ STREAMS = {
     "apply": "apply cal.json log.csv --stream",
     "selfcal": "selfcal platform.csv --study selfcal.toml --stream",
     "aoa": "aoa model.csv --study aoa.toml --stream",
+    "strapdown": "calibrate strapdown unit.csv --study strapdown.toml --stream",
 }
 
 

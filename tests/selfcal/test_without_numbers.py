@@ -91,7 +91,9 @@ def test_what_is_taken_as_exact_has_an_unknown_effect_where_no_filter_follows(mo
         return replace(true(*given, **more), coefficients=np.full(18, np.nan))
 
     monkeypatch.setattr(sources, "estimate", lost)
-    found, exact = sources.systematic(recorded(SHORT), SHORT, np.ones(18))
+    recording = recorded(SHORT)
+    run = true(recording, sources.problem(SHORT), "error-state")
+    found, exact = sources.systematic(recording, SHORT, run, np.ones(18))
     assert not found
     assert set(exact) == {
         "latitude",

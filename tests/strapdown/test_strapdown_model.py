@@ -25,9 +25,10 @@ from inercal.strapdown.coefficients import (
     slope,
     stated,
 )
+from inercal.strapdown.delay import delayed
 from inercal.strapdown.kernels import State, shoot
 from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.samples import Samples, delayed, freed, gains
+from inercal.strapdown.samples import Samples, freed, gains
 from inercal.strapdown.settings import Motion
 from inercal.strapdown.simulate import _turns, simulated, truth
 from inercal.strapdown.start import beginning, carried_through

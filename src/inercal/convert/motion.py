@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.strapdown.samples import delayed
+from inercal.strapdown.delay import delayed
 
 _HEAD = 50
 """Steps of time at the beginning of a record, whose median is the interval of its samples."""

@@ -44,18 +44,15 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     """
     where = record.sources[0].path if record.sources else "record"
     sensor, unread = _rate_sensor(record, settings, where), as_recorded(record, settings).fixed
-    columns = [
-        record[f"{name}_{axis}"]
-        for name in (sensor, "th", "acc")
-        for axis in "xyz"
-        if f"{name}_{axis}" not in unread
-    ]
+    names = [f"{name}_{axis}" for name in (sensor, "th", "acc") for axis in "xyz"]
+    names = [name for name in names if name not in unread]
+    columns = [record[name] for name in names]
     reference = [record[name] for name in _REFERENCE] if set(_REFERENCE) <= record.columns.keys() else []
     for column in [*columns[1:], *reference]:
         if column.t is not columns[0].t:
             text = f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time"
             raise RecordError(where, text)
-    values = {column.name: column.si() for column in columns}
+    values = {name: column.si() for name, column in zip(names, columns, strict=True)}
     values |= {name: np.full(len(columns[0].t), angle) for name, angle in unread.items()}
     rate, th, acc = (
         np.stack([values[f"{name}_{axis}"] for axis in "xyz"], axis=-1) for name in (sensor, "th", "acc")

@@ -12,6 +12,7 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.strapdown.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
+from inercal.strapdown.delay import delayed
 from inercal.strapdown.kernels import Gains, Motion, force_at_origin, increments, true_force, true_rate
 
 
@@ -49,24 +50,6 @@ def _pairs() -> Array:
 
 
 PAIRS: Final = _pairs()
-
-
-def delayed(x: Array, samples: float) -> Array:
-    """Means (n, 3) over intervals that lie earlier by so many ``samples``, by a cubic through four of the running
-    sums; the first and the last mean stand for those beyond."""
-    whole = int(np.floor(samples))
-    part = whole + 1.0 - samples  # 0 < part <= 1, after the second of the four points
-    weights = (
-        -part * (part - 1.0) * (part - 2.0) / 6.0,
-        (part + 1.0) * (part - 1.0) * (part - 2.0) / 2.0,
-        -(part + 1.0) * part * (part - 2.0) / 2.0,
-        (part + 1.0) * part * (part - 1.0) / 6.0,
-    )
-    rows = np.arange(len(x)) - whole - 2
-    out = np.zeros_like(x)
-    for k, weight in enumerate(weights):  # steps of the sums are the means
-        out += weight * x[np.clip(rows + k, 0, len(x) - 1)]
-    return out
 
 
 def gains(c: Array) -> Gains:

@@ -8,8 +8,9 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.strapdown.coefficients import KA, KG, SIZE, TAU, A, D, R, array_of, names, slope, stated
+from inercal.strapdown.delay import delayed
 from inercal.strapdown.error_state import filtered
-from inercal.strapdown.samples import Samples, delayed, freed
+from inercal.strapdown.samples import Samples, freed
 from inercal.strapdown.settings import StrapdownSettings
 from inercal.strapdown.task import StrapdownCalibration, calibrate
 from inercal.studies.load import load_strapdown_study

@@ -91,7 +91,8 @@ def _off(recording: Recording, now: FilterResult) -> float:
         products, squares = columns[1:] * columns[:-1], np.square(columns)
         if np.isfinite(products).any():
             mean = float(np.nanmean(squares))
-            off = max(off, abs(mean - 1.0), abs(float(np.nanmean(products))) / mean)
+            alike = abs(float(np.nanmean(products))) / mean if mean > 0.0 else 0.0
+            off = max(off, abs(mean - 1.0), alike)
     return off
 
 

@@ -377,10 +377,9 @@ def rig_entries(
 def encoder_roots(
     th: Vector | Array, axes: Axes, signs: Array, sigma: float, joints: Array, floor: float
 ) -> tuple[Vectors, Vector]:
-    """Inverse Cholesky factor (lower, rows) of the covariance of an encoder attitude, and its variances (3,).
-
-    The covariance is ``sigma^2 J D J^T + floor I`` [rad^2] about the axes of p, at gimbal angles ``th`` (3,), D the
-    diagonal matrix of ``joints`` (3,), the variance of each joint's angle over that of an encoder.
+    """Inverse Cholesky factor (lower, rows) of the covariance of an encoder attitude, and its variances (3,): of
+    ``sigma^2 J D J^T + floor I`` [rad^2] about the axes of p at gimbal angles ``th`` (3,), D diagonal:
+    ``joints`` (3,), the variance of each joint's angle over that of an encoder.
     """
     jx, jy, jz = joint_axes(th, axes, signs)
     s, dx, dy, dz = sigma * sigma, joints[0], joints[1], joints[2]
