@@ -190,7 +190,7 @@ def of_rows(quick: bool) -> list[Curve]:
             (n, lambda t=t, rows=rows: fusion.advance(fusion.initial(of), of, t, rows, last=True), 1)
         )
         works["inercal, smoother"].append(
-            (n, lambda t=t, rows=rows, s=trace.starts: smoother.smooth(of, t, rows, s), 1)
+            (n, lambda t=t, rows=rows, s=trace: smoother.smooth(of, t, rows, s), 1)
         )
     return measured("Angle of attack, 19 states", "rows", 1 if quick else 3, works)
 
