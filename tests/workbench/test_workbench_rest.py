@@ -55,6 +55,18 @@ def test_a_study_that_comes_says_what_kind_the_session_is(bench, example, kind):
     assert bench.ask(f"/api/v1/sessions/{session['session']}")[1]["kind"] == kind
 
 
+def test_a_map_that_came_alone_stays_and_one_that_was_guessed_goes_with_its_study(bench):
+    _, session = bench.ask("/api/v1/sessions", {"title": "mapped"})
+    number, example = session["session"], EXAMPLES["ferraris-si"]
+    own = (FOLDER / example.map).read_bytes()
+    put(bench, number, example.records[0], (FOLDER / example.records[0]).read_bytes())
+    put(bench, number, example.map, own)
+    for expected in (True, False):
+        assert bench.ask(f"/api/v1/sessions/{number}/study", {"kind": "imu"})[0] == 201
+        kept = bench.ask(f"/api/v1/sessions/{number}/files/study-map.toml")[1]
+        assert (kept.encode() == own) is expected
+
+
 def test_a_study_with_a_fault_is_refused_in_one_sentence(bench):
     _, session = bench.ask("/api/v1/sessions", {"title": "wrong"})
     put(bench, session["session"], "log.csv", b"t [s],acc_x [m/s^2]\n0,1\n")

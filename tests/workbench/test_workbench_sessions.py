@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from inercal.errors import InputError
 from inercal.examples import EXAMPLES
 from inercal.workbench import sessions as module
+from inercal.workbench.bench import open_bench
 from inercal.workbench.sessions import COMMANDS, MAP, STUDY, Sessions, receive, safe_name
 
 
@@ -114,3 +115,15 @@ def test_sessions_are_numbered_found_again_and_dropped(sessions):
     for wrong in ("0009", "../jobs", "x"):
         with pytest.raises(InputError):
             sessions.get(wrong)
+
+
+def test_a_store_is_the_same_from_every_folder(tmp_path, monkeypatch):
+    """Commands run in the folders of sessions: a store named from where the workbench was started must stay that one."""
+    monkeypatch.chdir(tmp_path)
+    for given, expected in (
+        ("lab", str(tmp_path / "lab")),
+        ("postgresql://here/lab", "postgresql://here/lab"),
+    ):
+        bench = open_bench(tmp_path / "work", given)
+        bench.close()
+        assert bench.store == expected

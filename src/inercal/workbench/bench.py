@@ -27,7 +27,7 @@ _HELD = 2
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A recording that was read: the record, its channels as they are drawn, and the command that inspects it."""
+    """A recording that was read: the record, and its channels as they are drawn."""
 
     record: Record
     courses: tuple[Course, ...]
@@ -69,7 +69,8 @@ class Bench:
         return self.sessions.of_kind(session, kind_of(path)) if path.name == STUDY else session
 
     def begin_study(self, session: Session, kind: str | None = None, rate: str | None = None) -> Session:
-        """Write a study, and a guessed map, for the recordings of a session; those there are replaced.
+        """Write a study, and a guessed map, for the recordings of a session; those there are replaced, but for a map
+        that came without a study.
 
         Raises `InputError` where the recordings cannot be read or the kind is none.
         """
@@ -77,11 +78,14 @@ class Bench:
 
         names = session.recordings
         known = kind_of_record(names) if kind is None else kind
+        stays = session.map is not None and session.study is None
         session = self.sessions.of_kind(session, known)
         study, column_map = begun(known, names, Path(STUDY), Path(MAP), rate)  # type: ignore[arg-type]
         write_text(session.folder / STUDY, study)
-        if column_map is not None:
+        if column_map is not None and not stays:
             write_text(session.folder / MAP, column_map)
+        elif not stays:
+            (session.folder / MAP).unlink(missing_ok=True)
         return session
 
     def run(self, session: Session) -> Job:
@@ -162,6 +166,8 @@ class Bench:
 
 def open_bench(root: Path, store: str | None = None) -> Bench:
     """The bench of a work folder, which is made where it is not there; raises `InputError`."""
+    if store is not None and "://" not in store:
+        store = str(Path(store).expanduser().absolute())  # commands run in the folders of sessions
     try:
         (root / "sessions").mkdir(parents=True, exist_ok=True)
         for part in root.glob(f"sessions/*/.*{PART}"):  # of uploads that a crash cut off

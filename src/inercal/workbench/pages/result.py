@@ -95,8 +95,9 @@ def _budget(result: Result) -> None:
 
 def _compared(bench: Bench, job: Job) -> None:
     """Set the result beside another of the same kind."""
+    titles = {session.id: session.title for session in bench.sessions}  # a session may have been deleted
     others = {
-        each.id: f"job {each.id}, {bench.sessions.get(each.session).title}, {each.made[:16]}"
+        each.id: f"job {each.id}, {titles.get(each.session, 'deleted session')}, {each.made[:16]}"
         for each in bench.queue
         if each.calibrates and each.result is not None and each.id != job.id
     }
