@@ -118,7 +118,7 @@ def test_sessions_are_numbered_found_again_and_dropped(sessions):
 
 
 def test_a_store_is_the_same_from_every_folder(tmp_path, monkeypatch):
-    """Commands run in the folders of sessions: a store named from where the workbench was started must stay that one."""
+    """Commands run in the folders of sessions: a store is meant as seen from where the workbench was started."""
     monkeypatch.chdir(tmp_path)
     for given, expected in (
         ("lab", str(tmp_path / "lab")),
