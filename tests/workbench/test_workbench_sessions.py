@@ -120,10 +120,10 @@ def test_sessions_are_numbered_found_again_and_dropped(sessions):
 def test_a_store_is_the_same_from_every_folder(tmp_path, monkeypatch):
     """Commands run in the folders of sessions: a store is meant as seen from where the workbench was started."""
     monkeypatch.chdir(tmp_path)
-    for given, expected in (
+    for named, expected in (
         ("lab", str(tmp_path / "lab")),
         ("postgresql://here/lab", "postgresql://here/lab"),
     ):
-        bench = open_bench(tmp_path / "work", given)
+        bench = open_bench(tmp_path / "work", named)
         bench.close()
         assert bench.store == expected
