@@ -18,7 +18,8 @@ from campaigns import aided, ferraris, rows
 from campaigns import imu as by_hand
 
 from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.executors import Processes
+from inercal.estimate.runs import run
 from inercal.imu.aided.coefficients import circumstances_of, names_of
 from inercal.imu.ferraris.method import NAMES
 from inercal.imu.multiposition.accelerometer import SQUARES

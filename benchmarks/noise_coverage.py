@@ -16,8 +16,9 @@ import numpy as np
 from campaigns.noise import MIXES, one_recording
 from scipy import stats
 
+from inercal.estimate.executors import Processes
 from inercal.estimate.result import coverage_factor
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.runs import run
 from inercal.instruments.noise import SYMBOLS
 
 SEED, LEVEL = 20261121, 0.95

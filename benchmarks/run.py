@@ -4,7 +4,8 @@
 
 Writes results.md, results.json and cost.svg. The long campaigns are not in it but for the short ones of `accuracy.py`;
 each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`, `turntable_coverage.py`,
-`selfcal_coverage.py`, `selfcal_robustness.py`, `aoa_bands.py`, `aoa_endless.py`.
+`selfcal_coverage.py`, `selfcal_robustness.py`, `strapdown_coverage.py`, `aoa_bands.py`, `aoa_endless.py`; so is
+`workbench_speed.py`.
 """
 
 import argparse
@@ -34,6 +35,7 @@ PARTS = {
     "Streams": "streaming",
     "Commands": "commands",
     "Laboratory": "laboratory",
+    "Fleets": "fleets",
     "Errors": "accuracy",
 }
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from inercal.estimate.runs import Threads
+from inercal.estimate.executors import Threads
 from inercal.examples import FOLDER
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.monte_carlo import campaign

@@ -6,7 +6,8 @@
 Records are those of benchmarks/independent/selfcal.py, with the same noise with a fault and without it. The table, as
 Markdown, has for each fault the root mean square over the draws of the shift, over its u, of the coefficient that is
 shifted most; how many draws end ok, and the largest error of these over u; all verdicts; and the first words of what
-is said to do harm.
+is said to do harm. NEES is that of the 18 coefficients, over 18; how much wider u is than that of the paper's model
+on a rig without a fault, as median and largest.
 """
 
 from __future__ import annotations
@@ -148,15 +149,16 @@ def calibrated(states: str, number: int, drawn: Faults):
 
 
 @functools.cache
-def without_fault(states: str, number: int) -> np.ndarray:
-    """The 18 coefficients of a record without a fault, with the same noise."""
-    return calibrated(states, number, Faults()).values[:18]
+def without_fault(states: str, number: int):
+    """The result of a record without a fault, with the same noise."""
+    return calibrated(states, number, Faults())
 
 
 def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
     """Shift, verdicts and words of a fault."""
     rng = np.random.default_rng([SEED, list(ALL).index(fault), size])
-    shift, errors, verdicts, said = [], [], Counter(), Counter()
+    shift, errors, nees, wider = [], [], [], []
+    verdicts, said = Counter(), Counter()
     for number in range(draws):
         drawn = ALL[fault][size][1](rng)
         done = calibrated(states, number, drawn)
@@ -165,9 +167,12 @@ def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
         said.update(harmful)
         if len(done.names):
             values, u = done.values[:18], done.u[:18]
-            shift.append((values - without_fault(states, number)) / u)
+            shift.append((values - without_fault(states, number).values[:18]) / u)
+            off = (values - TRUTH) / u
+            nees.append(off @ np.linalg.solve(done.covariance[:18, :18] / np.outer(u, u), off) / 18)
+            wider.append(u / without_fault('"paper"', number).u[:18])
             if done.status.value == "ok":
-                errors.append(np.abs((values - TRUTH) / u).max())
+                errors.append(np.abs(off).max())
     rms = np.sqrt(np.mean(np.square(shift), axis=0)) if shift else np.full(18, np.nan)
     worst = int(np.nanargmax(rms)) if shift else 0
     return {
@@ -175,12 +180,18 @@ def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
         "name": done.names[worst] if len(done.names) else "",
         "ok": verdicts["ok"] / draws,
         "worst_ok": float(max(errors, default=np.nan)),
+        "nees": float(np.mean(nees)) if nees else np.nan,
+        "wider": [float(f(wider)) for f in (np.median, np.max)] if wider else [],
         "verdicts": dict(verdicts),
         "said": dict(said.most_common(3)),
     }
 
 
-HEAD = "| fault | size | shift | ok | worst of those ok | verdicts | said |\n" + "|---" * 7 + "|"
+HEAD = (
+    "| fault | size | shift | ok | worst of those ok | NEES/18 | wider | verdicts | said |\n"
+    + "|---" * 9
+    + "|"
+)
 
 
 def row(key: str, each: dict) -> str:
@@ -190,7 +201,8 @@ def row(key: str, each: dict) -> str:
     words = "; ".join(f"{text} ({count})" for text, count in each["said"].items())
     return (
         f"| {fault} | {size} | {each['rms']:.1f} u of {each['name']} | {100 * each['ok']:.0f} % "
-        f"| {each['worst_ok']:.1f} u | {verdicts} | {words} |"
+        f"| {each['worst_ok']:.1f} u | {each['nees']:.2f} "
+        f"| {' to '.join(f'{ratio:.2f}' for ratio in each['wider'])} | {verdicts} | {words} |"
     )
 
 
@@ -199,11 +211,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument("--states", default="", help="of [model], as in the study; its default if absent")
-    parser.add_argument("--only", default="", help="part of the fault's name")
+    parser.add_argument("--only", default="", help="part of fault and size")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
-    asked = [(fault, k) for fault, sizes in ALL.items() if given.only in fault for k in range(len(sizes))]
+    asked = [
+        (fault, k)
+        for fault, sizes in ALL.items()
+        for k, (words, _) in enumerate(sizes)
+        if given.only in f"{fault} {words}"
+    ]
     with ProcessPoolExecutor(given.workers) as pool:
         waiting = {
             f"{fault}|{ALL[fault][k][0]}": pool.submit(summary_of, given.states, fault, k, given.draws)

@@ -13,7 +13,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.runs import Processes, run
+from inercal.estimate.executors import Processes
+from inercal.estimate.runs import run
 from inercal.instruments.by_angle import EXTRA, channel_model
 from inercal.validate.gyrowheel import (
     one_turntable_calibration,

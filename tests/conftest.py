@@ -1,5 +1,6 @@
 """What holds for all tests: none of them judges speed, and what takes long is marked so."""
 
+import gc
 import os
 import signal
 import sys
@@ -7,6 +8,11 @@ import time
 
 import pytest
 from hypothesis import settings
+
+# As the commands do, before NumPy is imported: the matrices are small, and threads of two workers wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+gc.set_threshold(50_000, 20, 20)  # as the commands do
 
 LIMIT = 2.0
 """Processor time that a test may take without the mark `slow` or `campaign` [s], on a machine of `YARDSTICK`."""

@@ -39,6 +39,7 @@ FLOORS = [
     {"laboratory"},
     {"validate"},
     {"face"},
+    {"fleet"},
     {"cli", "workbench", "__main__"},
 ]
 SYSTEMS = {"imu", "strapdown", "turntable", "selfcal", "aoa"}
@@ -155,7 +156,7 @@ WITHIN = {
     ),
     "strapdown": (
         "limits coefficients settings kernels delay samples arrow simulate rests start batch error_state bounds "
-        "path_search design budget left_out restricted reading outcome task figures"
+        "path_search design foresight budget left_out considered restricted reading outcome task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
@@ -163,7 +164,7 @@ WITHIN = {
     ),
     "aoa": (
         "limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
-        "simulate design task runs figures"
+        "simulate design foresight task runs figures"
     ),
     "selfcal": (
         "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
@@ -346,10 +347,10 @@ def names_defined(tree):
 
 
 def is_called_from_outside(module, node):
-    """Python's own names, checks that pydantic runs, what notebooks and the web call, and the commands."""
+    """Python's own names, checks that pydantic runs, what notebooks, dask and the web call, and the commands."""
     checked = any("_validator" in ast.unparse(each) for each in node.decorator_list)
     asked = any(ast.unparse(each).startswith("app.") for each in node.decorator_list)
-    of_others = node.name in ("nullable_schema", "_repr_html_")
+    of_others = node.name in ("nullable_schema", "_repr_html_", "setup")
     return node.name.startswith("__") or checked or asked or of_others or room(module) == "cli"
 
 

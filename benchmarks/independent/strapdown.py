@@ -39,6 +39,7 @@ class Unit:
             out |= {f"K0_{x}": self.K0[i], f"K1_{x}": k1, f"D_F_{x}": self.D[i], f"S_{x}": s}
             out |= {f"K2_{x}": self.k2[i] / k1}
             for j, y in enumerate("xyz"):
+                out[f"G_{x}{y}"] = self.g[i, j]
                 if j > i:
                     out[f"M_{x}{y}"] = self.Ka[i, j] / k1
                 if j != i:

@@ -76,6 +76,7 @@ Map, lower floors first; each imports only from those above its own line
     laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     face                       the verbs of Python, and the results that they give back
+    fleet                      many units of one make: batch, capability, outliers
     workbench                  the commands in a browser
     cli                        one module per verb
 """
@@ -103,6 +104,7 @@ if TYPE_CHECKING:
     from inercal.face.verbs import sensitivity as sensitivity
     from inercal.face.verbs import simulate as simulate
     from inercal.face.verbs import temperature as temperature
+    from inercal.fleet.batch import batch as batch
     from inercal.records.record import Record as Record
 
 __version__ = "0.1.0"
@@ -120,6 +122,7 @@ _WHERE = {
         "face.result": ("Result",),
         "face.study": ("Study", "study"),
         "face.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
+        "fleet.batch": ("batch",),
         "records.record": ("Record",),
     }.items()
     for name in names

@@ -66,6 +66,7 @@ CODES: dict[str, Code] = {
         "a sample rate was typed without an uncertainty, or time stamps are taken as exact", _BY_SIZE
     ),
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
+    "considered": Code("an effect that is not fitted counts in u, by its usual size", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
     "hysteresis": Code("values on rising and on falling temperature or input differ", _NEVER),
     "dead_zone": Code("an output does not follow small changes of its input", _NEVER),

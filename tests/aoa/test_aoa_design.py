@@ -114,7 +114,7 @@ def test_the_bound_of_the_fusion_is_that_of_many_runs():
 
 def test_exchange_finds_what_all_layouts_hold(monkeypatch):
     of = study(motion=QUICK, design=Design(3, -0.2, 0.3, 4))
-    states = designs._course(of)
+    states = designs.courses_of(of)
     spots = [
         (angle, float(r)) for angle in (0.0, 0.5 * math.pi, -0.5 * math.pi) for r in np.linspace(-0.2, 0.3, 4)
     ]
@@ -126,7 +126,7 @@ def test_exchange_finds_what_all_layouts_hold(monkeypatch):
 def test_one_accelerometer_more_is_better():
     of = study(states=8, motion=QUICK, noise=WHITE, prior=EXACT)
     spots = [(angle, float(r)) for angle in (0.0, -0.5 * math.pi) for r in np.linspace(-0.05, 0.4, 3)]
-    three, four = (designs._search(of, spots, count, designs._course(of))[0].sample for count in (3, 4))
+    three, four = (designs._search(of, spots, count, designs.courses_of(of))[0].sample for count in (3, 4))
     assert four < three
 
 

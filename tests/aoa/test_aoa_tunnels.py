@@ -171,7 +171,7 @@ def test_a_motion_that_is_there_keeps_its_band():
 
 def test_a_plunge_is_allowed_for():
     """0.02 g at 2 Hz: with the usual flexure 0.1 deg and 9 u off; along the vertical it changes the size of gravity,
-    not its direction, and costs a tenth of u at most."""
+    not its direction, and costs a quarter of u at most."""
     ratios = []
     for seed in range(3):
         recording, run = recorded("plunge 0.02 g, 2 Hz", seed, duration=12.0)
@@ -188,7 +188,7 @@ def test_a_plunge_is_allowed_for():
         error = (filtered.theta - run.theta)[late]
         ratios.append(np.mean(np.square(error / filtered.u[late])))
         assert np.sqrt(np.mean(error**2)) < 0.03 * DEG
-        assert np.median(filtered.u[late]) < 1.1 * np.median(calm.u[late])
+        assert np.median(filtered.u[late]) < 1.25 * np.median(calm.u[late])
     assert np.sqrt(np.mean(ratios)) < 1.4
 
 

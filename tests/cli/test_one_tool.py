@@ -28,7 +28,7 @@ BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
 READ_A_RECORD = {
     *("inspect", "calibrate imu", "calibrate strapdown", "calibrate turntable", "selfcal", "aoa"),
-    *("allan", "temperature", "apply", "monitor"),
+    *("allan", "temperature", "apply", "monitor", "batch"),
 }
 READ_A_STUDY = {
     *(
@@ -39,6 +39,7 @@ READ_A_STUDY = {
         "aoa",
         "sensitivity",
         "design positions",
+        "batch",
     ),
     *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
@@ -80,8 +81,9 @@ def options(text):
 def test_an_option_has_one_kind_of_value_and_one_text_in_all_commands(helps):
     """Whoever knows one command knows the options of the others; --compare, --filter and --stream say what each has.
 
-    --runs is a number of simulated runs, and of `aoa` the table that lists them; `keep` is given a --report."""
-    own = {"--compare", "--filter", "--stream", "--runs", "--report"}
+    --runs is a number of simulated runs, and of `aoa` the table that lists them; `keep` is given a --report; --out of
+    `batch` is a folder."""
+    own = {"--compare", "--filter", "--stream", "--runs", "--report", "--out"}
     meanings = {}
     for command, text in helps.items():
         for name, (value, words) in options(text).items():

@@ -46,6 +46,7 @@ SLOW = [
     "docs/tutorials/self-calibration.md",
     "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
+    "docs/tutorials/your-own-platform.md",
 ]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)

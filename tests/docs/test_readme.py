@@ -27,8 +27,13 @@ HEADINGS = (
     "In a wind tunnel",
     "In the laboratory",
 )
-#: the one command of "Before you rely on it", which takes some ten seconds and is run by test_validate_command
-RUN_ELSEWHERE = ["inercal validate --report validation.html"]
+#: of "Many units, many machines", run by the page calibrate-a-fleet.md and by test_cluster; and the one command of
+#: "Before you rely on it", which takes some ten seconds and is run by test_validate_command
+RUN_ELSEWHERE = [
+    "inercal batch fleet.csv --study imu.toml --out fleet",
+    "inercal batch fleet.csv --study imu.toml --out fleet --cluster tcp://10.0.0.5:8786",
+    "inercal validate --report validation.html",
+]
 
 
 def commands(heading: str) -> list[str]:
@@ -99,5 +104,10 @@ def test_the_commands_run(heading, tmp_path, monkeypatch, capsys):
 
 def test_no_command_is_left_out():
     everywhere = re.findall(r"^    inercal .*$", README, re.MULTILINE)
-    assert commands("Before you rely on it") == RUN_ELSEWHERE
+    elsewhere = [
+        line
+        for heading in ("Many units, many machines", "Before you rely on it")
+        for line in commands(heading)
+    ]
+    assert elsewhere == RUN_ELSEWHERE
     assert len(everywhere) == sum(len(commands(heading)) for heading in HEADINGS) + len(RUN_ELSEWHERE)

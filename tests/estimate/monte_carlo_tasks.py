@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.errors import InputError
-from inercal.estimate.runs import Processes, Serial, run
+from inercal.estimate.executors import Processes, Serial
+from inercal.estimate.runs import run
 
 
 def line_fit(rng):

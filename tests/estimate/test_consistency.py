@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.estimate.consistency import nis, surprising, whiteness
+from inercal.estimate.consistency import nis, slow_power, surprising, whiteness
 
 DIMS = 6
 
@@ -99,3 +99,25 @@ def test_columns_that_were_never_measured_are_left_out():
     x[:, 3:] = np.nan
     assert whiteness(x) > 1e-3
     assert whiteness(np.full((50, 2), np.nan)) == 1.0
+
+
+def test_slow_power_is_a_probability_where_innovations_are_white():
+    """Of 400 sets of 3 columns, those below a probability: binomial within four standard deviations of it."""
+    rng = np.random.default_rng(20261124)
+    chances = np.array([slow_power(rng.standard_normal((1000, 3)), 25.0) for _ in range(400)])
+    for chance in (0.05, 0.5):
+        assert abs(np.mean(chances < chance) - chance) < 4.0 * np.sqrt(chance * (1.0 - chance) / 400)
+
+
+def test_slow_power_shows_a_process_far_beneath_the_noise():
+    """Variance of 2 % correlated over 25 rows, in 3 columns of 4000: no lag tells of so little."""
+    rng, keep = np.random.default_rng(20261125), np.exp(-1.0 / 25.0)
+    slow = np.zeros((4000, 3))
+    for k in range(1, len(slow)):
+        slow[k] = keep * slow[k - 1] + 0.15 * np.sqrt(1.0 - keep**2) * rng.standard_normal(3)
+    assert slow_power(slow + rng.standard_normal(slow.shape), 25.0) < 1e-6
+
+
+def test_slow_power_needs_measurements():
+    assert slow_power(np.full((50, 3), np.nan), 5.0) == 1.0
+    assert slow_power(np.zeros((0, 3)), 5.0) == 1.0

@@ -8,7 +8,8 @@ from scipy import stats
 
 from inercal.errors import InputError
 from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.runs import Threads, run
+from inercal.estimate.executors import Threads
+from inercal.estimate.runs import run
 from rows import for_each
 
 

@@ -14,8 +14,9 @@ import monte_carlo_tasks as tasks
 import numpy as np
 import pytest
 
-from inercal.errors import InputError
-from inercal.estimate.runs import Processes, RunError, Serial, Threads, generator, run
+from inercal.errors import InercalError, InputError
+from inercal.estimate.executors import Processes, Serial, Threads
+from inercal.estimate.runs import RunError, generator, run
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,7 @@ def test_an_interrupt_closes_the_executor():
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_worker_that_dies_does_not_hang_the_campaign():
-    with pytest.raises(Exception, match="terminated abruptly"):
+    with pytest.raises(InercalError, match="a process at work was ended"):
         run(tasks.killed, runs=3, seed=0, executor=Processes(1))
 
 

@@ -367,8 +367,14 @@ def test_verbs_survive_any_order_of_imports():
         assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("module", ["recordings", "study", "verbs", "noise", "calibrations", "laboratory"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        *(f"face.{room}" for room in ("recordings", "study", "verbs", "noise", "calibrations", "laboratory")),
+        "fleet.batch",
+    ],
+)
 def test_the_examples_of_the_verbs_run(module):
-    failed, tried = doctest.testmod(importlib.import_module(f"inercal.face.{module}"))
+    failed, tried = doctest.testmod(importlib.import_module(f"inercal.{module}"))
     assert failed == 0
     assert tried > 0

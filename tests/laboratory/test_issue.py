@@ -145,3 +145,20 @@ def test_without_a_store_the_certificate_says_so(lab, capsys, monkeypatch):
     save(result(1), "x.json")
     assert run([*words[:1], "nothing.json", *words[2:]]) == 2
     assert "nothing.json: cannot be read" in capsys.readouterr().err
+
+
+def test_a_result_kept_under_a_name_by_hand_is_found(lab, capsys):
+    """Its study says no instrument; kept under one, it gets its certificate, and is not kept twice."""
+    study = (lab / "study.toml").read_text()
+    item = '[item]\nmaker = "M"\nmodel = "G"\nserial = "17"\n'
+    (lab / "study.toml").write_text(re.sub("(?m)^instrument = .*$", "", study.replace(item, "")))
+    assert run([*CALIBRATE, "--out", "cal.json"]) == 0
+    words = ["certificate", "cal.json", "--lab", "lab.toml", "--number", "C-1", "--out", "c.xml"]
+    assert run(words) == 2
+    assert "found no instrument in it" in capsys.readouterr().err
+    assert run(["keep", "cal.json", "--instrument", "M, G, 18"]) == 0
+    assert run(words) == 0, capsys.readouterr().err
+    capsys.readouterr()
+    assert run(["results", "--instrument", "18", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["result"]["results"]
+    assert show(open_store(str(lab / "store")), row["id"]).certificates == ("C-1",)

@@ -1,5 +1,6 @@
 """NPZ archives, the shipped table test among them."""
 
+import threading
 from importlib.resources import files
 from pathlib import Path
 
@@ -121,3 +122,16 @@ def test_damaged_archives_end_in_one_sentence(tmp_path):
         with pytest.raises(RecordError, match="cannot be read as an NPZ file") as caught:
             read(path)
         assert "\n" not in str(caught.value)
+
+
+def test_an_archive_is_read_beside_another_thread():
+    """As in a server: the child is then no fork, and is handed all it needs."""
+    ended = threading.Event()
+    beside = threading.Thread(target=ended.wait)
+    beside.start()
+    try:
+        record = read(EXAMPLES / "table.npz")
+    finally:
+        ended.set()
+        beside.join()
+    assert len(record["acc_x"].values) > 10_000

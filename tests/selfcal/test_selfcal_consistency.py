@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from paper_study import TRUTH, study
 
-from inercal.estimate.runs import Threads
+from inercal.estimate.executors import Threads
 from inercal.selfcal.monte_carlo import campaign
 
 SEED, FEW, RUNS = 20261121, 20, 100

@@ -52,7 +52,8 @@ def test_bounds_are_the_covariance_of_a_fit(grade):
     of_fit = pieces.slope @ fit.covariance @ pieces.slope.T
     # the first rest of the fit is 0.2 s longer; steps of the turn differ
     assert found.u == pytest.approx(np.sqrt(np.diag(of_fit)), rel=0.01)
-    assert np.all(np.diff(found.history, axis=0) <= 1e-9 * found.prior)
+    # information only grows; its inverse rounds: in units of the prior the largest eigenvalue is some 1e12
+    assert np.all(np.diff(found.history, axis=0) <= 1e-7 * found.prior)
     assert np.all(found.history <= found.prior * (1.0 + 1e-9))
 
 

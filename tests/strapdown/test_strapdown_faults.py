@@ -22,7 +22,7 @@ def test_a_sound_record_of_another_simulator_is_ok_and_met():
     runs = [result_of("none", seed) for seed in range(3)]
     for estimate, _ in runs:
         assert estimate.status is Status.OK
-        assert {each.code for each in estimate.findings} <= {"at_prior", "stated_exact"}
+        assert {each.code for each in estimate.findings} <= {"at_prior", "stated_exact", "considered"}
     z = np.array([list(errors.values()) for _, errors in runs])
     # coefficients of a run are correlated: their covariance tells the size of all together
     assert np.abs(z).max() < 4.5

@@ -353,3 +353,45 @@ def test_an_accelerometer_without_a_scale_is_said(tmp_path):
     }
     assert lost == {"eta_oy"}
     assert [finding.code for finding in said] == ["filter_fails"]
+
+
+# until the goals are met
+
+
+def until(text, goal, every=0.0, saving=None):
+    """Lines out, and what is said, of a stream that ends where a goal is met."""
+    lines, said, out = Lines(io.BytesIO(text.encode()), "log", None, lambda _: None), [], []
+    estimator = Selfcal(lines, problem(study(plan=SHORT)), every, goal=goal)
+    run(estimator, lines, out.append, saving, said.append)
+    return out, said
+
+
+def test_it_ends_at_the_first_row_that_meets_the_goals(tmp_path):
+    """The lines are those of the history up to it, whatever their interval; resumed it gives none twice."""
+    text = recorded(tmp_path)
+    title, *whole = of_file(text, study(plan=SHORT), tmp_path)
+    at = [title.split(",").index(f"u_ka0_{axis} [m/s^2]") for axis in "xz"]
+    u = np.array([[float(line.split(",")[k]) for k in at] for line in whole])
+    goal = {"ka0_x": u[70, 0] * 1.001, "ka0_z": u[80, 1] * 1.001}
+    first = int(np.argmax((u <= list(goal.values())).all(axis=1)))
+    assert 0 < first < len(whole) - 1
+    out, said = until(text, goal)
+    assert out == [title, *whole[: first + 1]]
+    assert said == [f"all 2 goals are met at t = {float(whole[first].split(',')[0]):.10g} s"]
+    rare, _ = until(text, goal, every=1e4)
+    assert rare == [title, whole[0], whole[first]]
+    saving = Saving(tmp_path / "saved", 10)
+    until(text, goal, saving=saving)
+    assert until(text, goal, saving=saving)[0] == [title]
+
+
+def test_it_does_not_end_where_the_rows_contradict_the_model(tmp_path):
+    def scattered(rows):
+        for k, row in enumerate(rows):
+            row["th_z [deg]"] = repr(float(row["th_z [deg]"]) + 0.05 * (-1) ** k)
+        return rows
+
+    text = recorded(tmp_path, change=scattered)
+    out, said = until(text, {"ka0_x": 0.0004})
+    assert len(out) > 60
+    assert said == []

@@ -9,7 +9,7 @@ import pytest
 
 from inercal._jit import source_hash
 from inercal.cli import run as inercal
-from inercal.estimate.runs import Serial
+from inercal.estimate.executors import Serial
 from inercal.geometry import earth
 from inercal.validate import run
 from inercal.validate.foundation import CASES

@@ -9,7 +9,7 @@ import pytest
 
 from inercal.aoa.paper import lever
 from inercal.convert import other_tools
-from inercal.estimate.runs import Serial
+from inercal.estimate.executors import Serial
 from inercal.findings import Status
 from inercal.geometry import earth, rotations
 from inercal.noise import deviation

@@ -1,6 +1,9 @@
 """The workbench in a real browser: the main job, refusals, reload, kill -9, two tabs, keyboard, widths, access."""
 
+import re
+import runpy
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,6 +57,10 @@ class Clicks:
         self.page.click(selector)
 
 
+EXPECTED = {"mpu6050": "ill_conditioned"}
+"""Verdict of an example, where it is not ok."""
+
+
 def test_from_a_dropped_log_to_a_certificate(chromium, bench, log, tmp_path):
     page, watched = opened(chromium, bench)
     click = Clicks(page)
@@ -86,9 +93,6 @@ def test_from_a_dropped_log_to_a_certificate(chromium, bench, log, tmp_path):
     page.wait_for_selector("[data-verdict]")
     assert page.inner_text("[data-verdict]").startswith("ok")
     assert "S_x" in page.inner_text("table")
-    page.wait_for_load_state("networkidle")
-    page.locator('button:has-text("Keep")').scroll_into_view_if_needed()
-    page.wait_for_timeout(1000)  # the report in its frame moves what is below it
     click('button:has-text("Keep")')
     page.wait_for_selector("text=It is kept.")
     page.get_by_label("lab.toml", exact=True).fill(LAB)
@@ -106,17 +110,11 @@ def test_from_a_dropped_log_to_a_certificate(chromium, bench, log, tmp_path):
     watched.sound()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
-    "name",
-    [
-        "sting",
-        *(
-            pytest.param(name, marks=pytest.mark.campaign)
-            for name in ("ferraris-si", "table", "strapdown", "selfcal")
-        ),
-    ],
+    "name", [name for name, each in EXAMPLES.items() if each.study is not None and len(each.records) < 3]
 )
-def test_an_example_of_another_system_comes_to_its_report(chromium, bench, name):
+def test_an_example_comes_to_its_report(chromium, bench, name):
     page, watched = opened(chromium, bench)
     page.click(f'button[aria-label="open example {name}"]')
     page.wait_for_selector("[data-findings]")
@@ -124,9 +122,18 @@ def test_an_example_of_another_system_comes_to_its_report(chromium, bench, name)
     page.wait_for_selector("text=The study can be used.")
     page.click('button:has-text("Run")')
     page.wait_for_url("**/result", timeout=180_000)
-    assert page.inner_text("[data-verdict]").startswith(("ok", "suspect"))
+    assert page.inner_text("[data-verdict]").startswith(EXPECTED.get(name, "ok"))
     frame = page.frame_locator("iframe.report")
     frame.locator("h2").first.wait_for()
+    dots = page.locator('[aria-label="residuals over time"] .points path')
+    if dots.count():  # one of them leads to its samples
+        page.wait_for_timeout(500)
+        dots.nth(1).scroll_into_view_if_needed()
+        box = dots.nth(1).bounding_box()
+        page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.click("[data-chosen] a")
+        page.wait_for_selector("[data-findings]")
+        assert "begin=" in page.url
     watched.sound()
 
 
@@ -143,7 +150,7 @@ def test_a_wrong_file_is_refused_in_a_sentence(chromium, bench, tmp_path):
 
 
 def test_a_run_goes_on_over_reloads_and_in_two_tabs(chromium, bench):
-    _, session = bench.ask("/api/v1/sessions", {"example": "xsens"})
+    _, session = bench.ask("/api/v1/sessions", {"example": "ferraris-si"})
     number = session["session"]
     page, watched = opened(chromium, bench)
     page.goto(f"{bench.base}/sessions/{number}/study")
@@ -173,7 +180,7 @@ def test_a_run_is_cancelled(chromium, bench):
 
 def test_after_kill_9_a_run_is_found_interrupted_and_is_started_again(chromium, tmp_path):
     killed = Served(tmp_path / "work")
-    _, session = killed.ask("/api/v1/sessions", {"example": "xsens"})
+    _, session = killed.ask("/api/v1/sessions", {"example": "ferraris-si"})
     _, job = killed.ask(f"/api/v1/sessions/{session['session']}/jobs", b"")
     until = time.monotonic() + 30.0
     while killed.ask(f"/api/v1/jobs/{job['job']}")[1]["state"] != "running" and time.monotonic() < until:
@@ -209,27 +216,69 @@ def test_the_way_to_a_run_needs_no_mouse(chromium, bench):
     watched.sound()
 
 
-PAGES = ["/", "/instruments", "/validation", "recording", "study", "run", "result"]
+def settled(page, figure, limit, patience=3.0):
+    """A figure of the page once it is at most ``limit``, or what it still is after ``patience`` [s]: plotly draws a
+    picture anew some moments after the width has changed."""
+    end = time.monotonic() + patience
+    while (found := page.evaluate(figure)) > limit and time.monotonic() < end:
+        page.wait_for_timeout(50)
+    return found
+
+
+PAGES = ["/", "/instruments", "/validation", "recording", "study", "design", "run", "result"]
+WIDTHS = (375, 768, 1366)
 
 
 @pytest.mark.parametrize(
-    ("width", "height", "scheme"),
-    [(1366, 768, "light"), (390, 844, "dark"), pytest.param(1366, 768, "dark", marks=pytest.mark.campaign)],
+    ("name", "scheme"),
+    [
+        ("ferraris-si", "light"),
+        pytest.param("ferraris-si", "dark", marks=pytest.mark.campaign),
+        pytest.param("sting", "light", marks=pytest.mark.campaign),
+        pytest.param("selfcal", "dark", marks=pytest.mark.campaign),
+    ],
 )
-def test_every_page_is_within_its_width_and_open_to_all(chromium, bench, width, height, scheme):
-    _, session = bench.ask("/api/v1/sessions", {"example": "ferraris-si"})
+def test_every_page_is_within_its_width_and_open_to_all(chromium, bench, name, scheme):
+    _, session = bench.ask("/api/v1/sessions", {"example": name})
     _, job = bench.ask(f"/api/v1/sessions/{session['session']}/jobs", b"")
     bench.ended(job["job"])
-    page, watched = opened(chromium, bench, width, height, color_scheme=scheme)
+    page, watched = opened(chromium, bench, color_scheme=scheme)
     for path in PAGES:
         page.goto(bench.base + (path if path.startswith("/") else f"/sessions/{session['session']}/{path}"))
         page.wait_for_selector("h1")
-        page.wait_for_load_state("networkidle")
         if path == "recording":
             page.wait_for_selector("[data-findings]")
-        wide = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-        assert wide <= 0, f"{path} is {wide} pixels too wide"
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 800})
+            wide = settled(page, "document.documentElement.scrollWidth - window.innerWidth", 0)
+            assert wide <= 0, f"{path} is {wide} pixels too wide for {width}"
         assert serious(page) == [], path
+    watched.sound()
+
+
+def test_a_plan_is_edited_turned_and_judged(chromium, bench):
+    """Lines, sliders by keyboard, the course of the test by its slider: each is seen at once, and in the study."""
+    _, session = bench.ask("/api/v1/sessions", {"example": "selfcal"})
+    page, watched = opened(chromium, bench)
+    page.goto(f"{bench.base}/sessions/{session['session']}/design")
+    page.wait_for_selector("text=5 stops, 18 values are predicted.")
+    page.fill('[aria-label="plan, a line each"]', "z, 180 deg\nx, 90 deg\ny, 45 deg")
+    page.wait_for_selector("text=4 stops, 18 values are predicted.")
+    _, study = bench.ask(f"/api/v1/sessions/{session['session']}/files/study.toml")
+    assert '["y", "45 deg"]' in study
+    page.wait_for_function("document.getElementById('moment').max > 50")
+    where = "document.querySelectorAll('.js-plotly-plot')[1].data.at(-1).x[1]"
+    before = page.evaluate(where)
+    page.locator("#moment").focus()
+    page.keyboard.press("End")
+    page.wait_for_function(f"Math.abs({where} - ({before})) > 0.1")
+    assert "x 90, y 45, z 180 deg" in page.inner_text("#moment-words")
+    slider = page.locator('[aria-label="noise.encoder"]')
+    slider.focus()
+    assert slider.input_value() == "50"
+    page.keyboard.press("End")
+    page.wait_for_selector("text=noise.encoder: 20 arcsec (10 times)")
+    page.wait_for_selector("""text=--set 'noise.encoder="20 arcsec"'""")
     watched.sound()
 
 
@@ -238,3 +287,17 @@ def test_examples_that_the_home_page_shows_are_those_of_the_commands(chromium, b
     shown = page.locator('button[aria-label^="open example"]').count()
     assert shown == sum(example.verb != "apply" and len(example.records) < 3 and example.study is not None
                         for example in EXAMPLES.values())  # fmt: skip
+
+
+@pytest.mark.campaign
+def test_the_tutorial_is_walked_and_its_pictures_are_taken(chromium, bench, tmp_path):
+    root = Path(__file__).parents[2] / "docs"
+    take = runpy.run_path(str(root / "pictures" / "workbench.py"))["take"]
+    page, watched = opened(chromium, bench, 1100, 760)
+    taken = take(page, bench.base, tmp_path)
+    shown = re.findall(r"pictures/(workbench-\w+\.png)", (root / "tutorials" / "workbench.md").read_text())
+    assert taken == shown
+    assert all(
+        (tmp_path / name).stat().st_size > 10_000 and (root / "pictures" / name).is_file() for name in taken
+    )
+    watched.sound()

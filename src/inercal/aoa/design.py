@@ -30,6 +30,7 @@ from inercal.aoa.layout import AXES, Layout, axes, tangential_arms
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.motion import course, duration
 from inercal.aoa.paper.residuals import error_terms
+from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.simulate import simulate
 from inercal.arrays import Array
@@ -125,7 +126,7 @@ def design(settings: AoaSettings, progress: Callable[[str], None] = lambda _: No
     if motion is None:
         raise StudyError("motion", "missing, expected the motion to design the sensors for")
     count = plan.accelerometers or len(settings.layout.names)
-    states = _course(settings)
+    states = courses_of(settings)
     places = np.linspace(plan.rearmost, plan.foremost, plan.places)
     spots = [(AXES[axis], float(r)) for axis in plan.axes for r in places]
     if count > len(spots):
@@ -182,6 +183,11 @@ def sample_bound(settings: AoaSettings, layout: Layout, states: tuple[Array, Arr
 
 def fusion_bound(settings: AoaSettings, layout: Layout) -> float:
     """Rms u [rad] of the angle by the fusion along the study's motion, of 20 s at most, after it settled."""
+    return settled_u(settings, layout, undisturbed(settings, layout))
+
+
+def undisturbed(settings: AoaSettings, layout: Layout) -> Recording:
+    """The study's motion, of 20 s at most, as sensors without noise would record it."""
     assert settings.motion is not None
     lasting = min(duration(settings.motion), _LONGEST)
     motion = (
@@ -195,14 +201,19 @@ def fusion_bound(settings: AoaSettings, layout: Layout) -> float:
     made = simulate(
         replace(of, noise=quiet, disturbances=type(of.disturbances)()), np.random.default_rng(0), {}
     )
+    return made.recording
+
+
+def settled_u(settings: AoaSettings, layout: Layout, recording: Recording) -> float:
+    """Rms u [rad] of the angle by the fusion along a recording without noise, after it settled."""
     # a bound holds nothing back
-    of = replace(of, estimator=replace(of.estimator, gate=math.inf))
-    filtered = estimate(made.recording, problem(of), settings.estimator.smooth)
-    u = filtered.u[(made.recording.t >= LIMITS.settling_time) & np.isfinite(filtered.u)]
+    of = replace(settings, layout=layout, estimator=replace(settings.estimator, gate=math.inf))
+    filtered = estimate(recording, problem(of), settings.estimator.smooth)
+    u = filtered.u[(recording.t >= LIMITS.settling_time) & np.isfinite(filtered.u)]
     return math.sqrt(float(np.mean(np.square(u)))) if len(u) else math.inf
 
 
-def _course(settings: AoaSettings) -> tuple[Array, Array, Array]:
+def courses_of(settings: AoaSettings) -> tuple[Array, Array, Array]:
     """Angles, rates and accelerations of the motion at some instants."""
     assert settings.motion is not None
     t = np.linspace(0.0, duration(settings.motion), _ROWS, endpoint=False)

@@ -178,8 +178,7 @@ class Limits:
     """Variance of theta [rad^2] at which linearisation ends: theta is found anew from the accelerometers."""
 
     contradicting_rows: int = 500
-    """Successive rows in which a sensor surprises by twice the gate, after which theta counts as lost: half a second at
-    1 kHz, longer than the errors of one sign by a slightly wrong model, such as 5 mm of a height at 1 Hz."""
+    """Successive rows in which a sensor surprises by twice the gate, after which theta counts as lost."""
 
     memory_time: float = 60.0
     """Time [s] from the first row on in which nothing fades, and the time constant of fading after it."""
@@ -197,8 +196,7 @@ class Limits:
     """Mean squared innovation, over that of a still model with the same noise, up to which a snap is large enough."""
 
     square_share: float = 4.0
-    """Square of the rate that a snap leaves free from row to row, times the longest arm, over an accelerometer's noise,
-    at most."""
+    """Square of the rate that a snap leaves free from row to row, times the longest arm, over noise, at most."""
 
     snap_excess: float = 0.08
     """Excess of it over one from which a snap that is ten times as large is taken where it takes as much away."""
@@ -216,8 +214,7 @@ class Limits:
     """Corner of a low pass, or notch, over the rate of rows, from which on it is left out."""
 
     fused_rate_ratio: float = 2.6
-    """Rate of the rows that are fused over the corner of the low pass, about: of more rows the noise is alike from row
-    to row, and counts as motion."""
+    """Rate of the rows that are fused, over the corner of the low pass: noise of more is alike from row to row."""
 
     rate_rows: int = 64
     """First rows, by which the rate is known that the band is made for."""
@@ -229,10 +226,13 @@ class Limits:
     """Spectral density of the gyro over its noise from which it counts as motion."""
 
     calm_share: float = 0.1
-    """Root mean square of the flexure that is found, over what is usually allowed, up to which less is."""
+    """Root mean square of the flexure that is found, over what is allowed, up to which less is."""
 
     calm_level: float = 0.3
-    """Flexure that is allowed then, over the usual one."""
+    """Flexure that is allowed then, over that before."""
+
+    calm_steps: int = 2
+    """Times that less may be allowed."""
 
     shaking_frequency: float = 4.0
     """Frequency [Hz] of flexure in a wide band."""
@@ -256,8 +256,7 @@ class Limits:
     """Spectral density of a line over that beside it."""
 
     common_k2: float = 1e-4 / STANDARD_GRAVITY
-    """Second-order coefficient [s^2/m] of an accelerometer, 100 ug/g^2, by which vibration is judged where the study
-    states none."""
+    """Second-order coefficient [s^2/m], 100 ug/g^2, by which vibration is judged where the study states none."""
 
     told_offset: float = 0.25
     """Offset of the angle by it, over u, from which it is said; from 1 on it harms."""

@@ -165,11 +165,19 @@ def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Esti
 def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
     """Identity of a result in the store, where it is kept first if it came as a file."""
     from inercal.laboratory.catalog import find
-    from inercal.laboratory.keep import item_of, keep, saved_in
+    from inercal.laboratory.keep import item_of, keep, kept_already, saved_in
 
-    if Path(given).is_file():
-        return keep(store, estimate, item_of(estimate), report, saved_in(Path(given), estimate)).id
-    return find(store, given)
+    if not Path(given).is_file():
+        return find(store, given)
+    saved, item = saved_in(Path(given), estimate), item_of(estimate)
+    known = kept_already(store, estimate, saved)
+    if known is None and item is None and estimate.names:
+        raise InputError(
+            given,
+            "found no instrument in it, expected [item] in its study, or that it is kept already, as by: inercal keep "
+            f'{given} --instrument "maker, model, serial"',
+        )
+    return keep(store, estimate, item, report, saved).id if known is None else known
 
 
 def _read(path: Path, html: Path | None, output: FileOutput) -> None:

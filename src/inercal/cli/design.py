@@ -8,7 +8,17 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.cli.options import Overrides, ResultOutput, Study, reading, study_in, working
+from inercal.cli.options import (
+    ClusterOption,
+    Overrides,
+    ResultOutput,
+    SearchersOption,
+    Study,
+    place_of,
+    reading,
+    study_in,
+    working,
+)
 from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
@@ -20,6 +30,8 @@ def design_positions(
     study: Study,
     /,
     *,
+    workers: SearchersOption = None,
+    cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
@@ -28,9 +40,10 @@ def design_positions(
     from inercal.face import turntable as system
 
     output.check((*WHOLE, ".csv"), (study,))
+    place = place_of(workers, cluster)
     the_study, read_s = study_in("turntable", study, overrides, output)
     with working(output) as progress:
-        designed = system.design(the_study, progress)
+        designed = system.design(the_study, progress, place)
 
     def rows(path: Path) -> None:
         write_text(path, _positions(designed.estimate.result["positions"], the_study.settings))
@@ -65,6 +78,8 @@ def design_selfcal(
     study: Study,
     /,
     *,
+    workers: SearchersOption = None,
+    cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
@@ -74,11 +89,12 @@ def design_selfcal(
     from inercal.face import selfcal as system
 
     output.check((".json", ".toml"), (study,))
+    place = place_of(workers, cluster)
     the_study, read_s = study_in("selfcal", study, overrides, output)
     with compiling("design selfcal", output.say_now):
         system.prepare_design(the_study)
     with reading(output, "searching") as progress:
-        designed = system.design(the_study, progress)
+        designed = system.design(the_study, progress, place)
 
     def plan(path: Path) -> None:
         write_text(path, _plan(designed.evidence.plan, designed.message))
@@ -161,6 +177,8 @@ def sensitivity(
     study: Study,
     /,
     *,
+    workers: SearchersOption = None,
+    cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
@@ -168,9 +186,10 @@ def sensitivity(
     from inercal.face import turntable as system
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))
+    place = place_of(workers, cluster)
     the_study, read_s = study_in("turntable", study, overrides, output)
     with reading(output, "sampling") as progress:
-        result = system.sensitivity(the_study, bool(output.targets), output.say_now, progress)
+        result = system.sensitivity(the_study, bool(output.targets), output.say_now, progress, place)
     analysed = result.evidence
     if analysed.note:
         output.say(analysed.note)

@@ -22,6 +22,7 @@ from inercal.errors import InputError
 if TYPE_CHECKING:
     from cyclopts import Token
 
+    from inercal.estimate.executors import Executor
     from inercal.face.study import Study as StudyOfFile
     from inercal.findings import Finding
     from inercal.records.record import Record
@@ -293,6 +294,38 @@ def _last_words(path: Path, text: str) -> None:
     """Put the progress into a file, in the place of what was there."""
     with suppress(OSError):
         path.write_text(printable(text), encoding="utf-8")
+
+
+WorkersOption = Annotated[
+    int | None,
+    Parameter(converter=whole_number, help="Processes at work; one for each processor if absent."),
+]
+SearchersOption = Annotated[
+    int | None,
+    Parameter(converter=whole_number, help="Processes at work; this one alone if absent."),
+]
+ClusterOption = Annotated[
+    str | None,
+    Parameter(
+        help="Cluster of dask to work on: tcp://host:8786, a scheduler file, or local. The extra `cluster` is needed."
+    ),
+]
+
+
+def count_of(workers: int | None, cluster: str | None) -> int:
+    """Number of processes, threads or workers of a local cluster by the two options; raises `InputError`."""
+    if workers is not None and workers < 1:
+        raise InputError("--workers", f"found {workers}, expected 1 or more")
+    if workers is not None and cluster not in (None, "local"):
+        raise InputError("--workers", f"found beside the cluster {cluster}, expected only one of them")
+    return workers or os.cpu_count() or 1
+
+
+def place_of(workers: int | None, cluster: str | None) -> Executor:
+    """The place in which starts or positions are computed, by the two options; raises `InputError`."""
+    from inercal.estimate.cluster import place
+
+    return place(1 if workers is None and cluster is None else count_of(workers, cluster), cluster)
 
 
 @contextmanager

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -43,6 +45,9 @@ def selfcal(
         bool, Parameter(help="Lines in, from standard input or one FILE, and coefficients out, live.")
     ] = False,
     every: Every = None,
+    until_goals: Annotated[
+        bool, Parameter(help="End a stream where the goals of the study are met and nothing contradicts it.")
+    ] = False,
     map_file: MapFile = None,
     span: Span = Span(),  # noqa: B008  (frozen)
     overrides: Overrides = None,
@@ -54,8 +59,11 @@ def selfcal(
     if stream:
         if compare:
             raise InputError("--compare", "found with a stream, expected one estimator")
-        stream_study("selfcal", _live, files, study, keys, every, map_file, span, streaming, output)
+        prepare = partial(_live, until_goals=until_goals)
+        stream_study("selfcal", prepare, files, study, keys, every, map_file, span, streaming, output)
         return 0
+    if until_goals:
+        raise InputError("--until-goals", "found without --stream, expected them together")
     paths = recorded("selfcal", files, streaming, every)
 
     from inercal._jit import compiling
@@ -81,7 +89,7 @@ def selfcal(
     return give(outcome, output, read_s)
 
 
-def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> Estimators:
+def _live(settings: SelfcalSettings, interval: float, output: ResultOutput, until_goals: bool) -> Estimators:
     """Prepare a calibration row by row."""
     from inercal._jit import compiling
     from inercal.selfcal.filters.problem import problem
@@ -96,6 +104,7 @@ def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> E
     settings, left_out = without_fixed(settings)
     of = problem(settings)
     filter_of(of)
+    goal = _goals(settings, of.names) if until_goals else {}
     for finding in left_out:
         output.say_finding(finding)
     with compiling(f"selfcal stream {of.filter.kind}", output.say):
@@ -103,6 +112,15 @@ def _live(settings: SelfcalSettings, interval: float, output: ResultOutput) -> E
 
     def estimator(lines: Lines) -> Selfcal:
         of_stream = as_recorded(lines.record, settings)
-        return Selfcal(lines, problem(of_stream), interval, output.say_finding, of_stream.fixed)
+        return Selfcal(lines, problem(of_stream), interval, output.say_finding, of_stream.fixed, goal)
 
     return estimator
+
+
+def _goals(settings: SelfcalSettings, names: Sequence[str]) -> Mapping[str, float]:
+    """The goals of a study; raises `StudyError` where it has none, or one for what is no state."""
+    if not settings.goal:
+        raise StudyError("goal", "missing, expected wanted uncertainties with --until-goals")
+    if others := [name for name in settings.goal if name not in names]:
+        raise StudyError("goal", f"found {others[0]}, which is no state of the model, expected states alone")
+    return settings.goal

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterable
 from dataclasses import replace
@@ -11,7 +10,17 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import FileOutput, Overrides, ReportOutput, Study, reading, whole_number
+from inercal.cli.options import (
+    ClusterOption,
+    FileOutput,
+    Overrides,
+    ReportOutput,
+    Study,
+    WorkersOption,
+    count_of,
+    reading,
+    whole_number,
+)
 from inercal.cli.outcome import WHOLE, emit, hand_over
 from inercal.errors import InputError
 
@@ -75,16 +84,23 @@ def simulate_selfcal(
         Path | None,
         Parameter(help="Save here what is done, and go on from it where it exists."),
     ] = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Simulate a platform that turns through the plan of a study, once or many times."""
     if runs is not None:
-        return _campaign(study, runs, seed, checkpoint, overrides or (), output)
-    if checkpoint is not None:
-        raise InputError("--checkpoint", "found without --runs, expected them together")
-    if output.report is not None:
-        raise InputError("--report", "found without --runs, expected them together")
+        return _campaign(study, runs, seed, checkpoint, (workers, cluster), overrides or (), output)
+    of_runs = {
+        "--checkpoint": checkpoint,
+        "--report": output.report,
+        "--workers": workers,
+        "--cluster": cluster,
+    }
+    for option, found in of_runs.items():
+        if found is not None:
+            raise InputError(option, "found without --runs, expected them together")
     _simulated("selfcal", study, seed, overrides, output)
     return 0
 
@@ -106,13 +122,15 @@ def _campaign(
     runs: int,
     seed: int,
     checkpoint: Path | None,
+    place: tuple[int | None, str | None],
     overrides: Iterable[str],
     output: ReportOutput,
 ) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal._jit import compiling
+    from inercal.estimate.cluster import Cluster
+    from inercal.estimate.executors import Threads
     from inercal.estimate.result import without_coefficients
-    from inercal.estimate.runs import Threads
     from inercal.face.study import read_study
     from inercal.findings import Status
     from inercal.records.read import source_of
@@ -124,6 +142,8 @@ def _campaign(
         raise InputError("--runs", f"found {runs}, expected 2 to {_MOST_RUNS:,}")
     _not_negative(seed)
     output.check(WHOLE, (study,))
+    workers, cluster = count_of(*place), place[1]
+    executor = Threads(workers) if cluster is None else Cluster(cluster, workers)
     of = read_study("selfcal", study, overrides)
     settings = of.settings
     with of.at_fault():
@@ -131,7 +151,7 @@ def _campaign(
             load_kernels(settings.filter.kind, problem(settings))
         clock = time.perf_counter()
         with reading(output, "simulating") as progress:
-            outcome = campaign(settings, runs, seed, None, Threads(os.cpu_count() or 1), checkpoint, progress)
+            outcome = campaign(settings, runs, seed, None, executor, checkpoint, progress)
     timing = {"solve": time.perf_counter() - clock}
     estimate = without_coefficients(
         "simulate selfcal",

@@ -74,6 +74,14 @@ LABORATORY = {
         "coefficient whether it is equal to the last digit, within u, or changed. Exit code 1: something changed.",
         "inercal rerun 6fee8a0a58",
     ),
+    ("batch", ""): (
+        "inercal.cli.batch:batch",
+        "Calibrate every unit of a fleet by one study.\n\nThe manifest is a CSV with the columns serial and files "
+        "(divided by `;`, paths or URLs), and a column for each key of the study that is a unit's own; or a folder of "
+        "recordings. OUT gets units.csv, units.parquet, fleet.html, fleet.json and a result for each unit. A unit that "
+        "fails is a row that says why; what is there already is not done again. Exit code 1: not all units are good.",
+        "inercal batch fleet.csv --study imu.toml --out fleet",
+    ),
     ("workbench", ""): (
         "inercal.cli.workbench:workbench",
         "Work in the browser: from a raw log to a certificate, on this machine and without any network.\n\n"

@@ -24,6 +24,7 @@ from inercal.designs.allowed import Mask, require
 from inercal.designs.candidates import Candidates
 from inercal.designs.criteria import Criterion, covariance
 from inercal.errors import InputError
+from inercal.estimate.executors import Executor, numbered
 
 if TYPE_CHECKING:
     from inercal.designs.exchange_kernel import State
@@ -55,6 +56,7 @@ def exchange(
     starts: int = 40,
     allowed: Mask | None = None,
     repeats: bool = False,
+    executor: Executor | None = None,
 ) -> Design:
     """The best design of ``n`` positions that exchanges find.
 
@@ -73,6 +75,8 @@ def exchange(
         Candidates that may be taken; all if absent.
     repeats : bool
         Whether a candidate may be taken more than once.
+    executor : Executor, optional
+        Place in which the starts are computed; the digits are the same in any.
 
     Raises
     ------
@@ -85,14 +89,14 @@ def exchange(
     indices = np.flatnonzero(open_)
     W, weights = _scaled(candidates.take(indices), criterion)
     p = len(candidates.names)
+    streams = tuple(rng.spawn(starts))
     designs = []
-    for stream in rng.spawn(starts):
-        first = _start(W[..., :p], n, repeats, stream)
-        if first is None:
+    for best in numbered(_Starts(W, p, weights, n, repeats, streams), starts, executor):
+        if best is None:
             raise InputError(
                 where, f"found none that identifies all of {p} coefficients, expected more positions"
             )
-        designs.append(np.sort(indices[_improved(W, p, weights, first, repeats)]))
+        designs.append(np.sort(indices[best]))
     values = np.array([_value(candidates.take(chosen), criterion) for chosen in designs])
     if not np.isfinite(values).any():
         raise InputError(
@@ -100,8 +104,25 @@ def exchange(
             f"found none that tells all of {p} coefficients to working precision, expected more positions",
         )
     # of determinants as such, whose logarithms may be near zero
-    best = _first_least(np.exp(values - values.min()) if criterion.weights is None else values)
-    return Design(designs[best], float(values[best]), values)
+    least = _first_least(np.exp(values - values.min()) if criterion.weights is None else values)
+    return Design(designs[least], float(values[least]), values)
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """Random designs of ``n`` rows of W (m, c, d) after all exchanges, each start from its own stream."""
+
+    W: Array
+    p: int
+    weights: Array | None
+    n: int
+    repeats: bool
+    streams: tuple[np.random.Generator, ...]
+
+    def __call__(self, number: int) -> Indices | None:
+        """The design (n,) of a start; None where none identifies the coefficients."""
+        first = _start(self.W[..., : self.p], self.n, self.repeats, self.streams[number])
+        return None if first is None else _improved(self.W, self.p, self.weights, first, self.repeats)
 
 
 def _value(plan: Candidates, criterion: Criterion) -> float:

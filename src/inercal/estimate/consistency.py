@@ -103,6 +103,28 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
     return float(min(1.0, np.min(np.array(chances)[:, present]) * present.sum() * len(chances)))
 
 
+def slow_power(innovations: ArrayLike, rows: float) -> float:
+    """Probability by chance of as much slow power as innovations (n, m) have together, NaN left out.
+
+    The test is that of a process correlated over some ``rows`` beneath white noise, whose spectrum weighs the
+    periodogram (locally most powerful: P. Whittle, Estimation and information in stationary time series, Arkiv foer
+    Matematik 2 (1953) 423). Its ordinates are exponential where innovations are white; their weighted sum is taken for
+    gamma distributed, with its mean and variance.
+    """
+    from scipy.special import gammaincc
+
+    x = np.nan_to_num(np.asarray(innovations, dtype=float))
+    n, squares = len(x), np.square(x).sum(axis=0)
+    seen = squares > 0.0
+    if n < 3 or not seen.any():
+        return 1.0
+    power = np.square(np.abs(np.fft.rfft(x[:, seen], axis=0)))[1 : (n + 1) // 2] / squares[seen]
+    weight = 1.0 / (1.0 + np.square(2.0 * np.pi * rows * np.arange(1, len(power) + 1) / n))
+    mean = float(weight.sum()) * power.shape[1]
+    variance = float(np.square(weight).sum()) * power.shape[1]
+    return float(gammaincc(mean**2 / variance, float(weight @ power.sum(axis=1)) * mean / variance))
+
+
 def _ratio(a: Array, b: Array) -> Array:
     """a / b, 0 where b is."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

@@ -13,27 +13,14 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import multiprocessing
 import os
 import pickle
-import signal
-import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import (
-    CancelledError,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    as_completed,
-    wait,
-)
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor as Pool
-from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,17 +28,13 @@ from numpy.typing import ArrayLike, NDArray
 from inercal import __version__
 from inercal._files import write_bytes
 from inercal.errors import InercalError, InputError
+from inercal.estimate.executors import Executor, computed, divided
 
 Task: TypeAlias = Callable[[np.random.Generator], Mapping[str, ArrayLike]]
 """One run: draws from the generator, returns named arrays whose shapes are the same in every run."""
 
 Sample: TypeAlias = dict[str, NDArray[np.float64]]
 """Named arrays; those of many runs are stacked along a leading axis, ``(runs, ...)``."""
-
-Work: TypeAlias = Callable[[Iterable[int]], Sample]
-"""Does the runs with these numbers, in this order, and stacks what they return."""
-
-Finished: TypeAlias = Generator[tuple[range, Sample], None, None]
 
 
 class RunError(InercalError):
@@ -73,110 +56,6 @@ class RunError(InercalError):
     def __str__(self) -> str:
         """Say it in one sentence."""
         return f"run {self.run} of seed {self.seed} failed: {self.cause}"
-
-
-class Executor(Protocol):
-    """Place in which the chunks of a campaign are computed."""
-
-    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
-        """Yield every chunk together with ``work(chunk)``, in any order.
-
-        When the generator is closed, or ``work`` raises, nothing may be left running.
-        """
-
-
-@dataclass(frozen=True)
-class Serial:
-    """One chunk after the other, in the calling thread."""
-
-    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
-        """Yield the chunks in their order."""
-        for chunk in chunks:
-            yield chunk, work(chunk)
-
-
-@dataclass(frozen=True)
-class Threads:
-    """Threads of this process: for tasks that spend their time in compiled kernels.
-
-    A thread cannot be stopped from outside: an interrupt waits for the runs, not the chunks, at work.
-    """
-
-    workers: int
-
-    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
-        """Yield the chunks as they are finished."""
-        stop = threading.Event()
-
-        def until_stop(chunk: Iterable[int]) -> Iterator[int]:
-            for number in chunk:
-                if stop.is_set():
-                    raise CancelledError
-                yield number
-
-        with ThreadPoolExecutor(self.workers) as pool:
-            try:
-                yield from _as_finished(pool, lambda chunk: work(until_stop(chunk)), chunks)
-            except BaseException:
-                stop.set()
-                pool.shutdown(cancel_futures=True)
-                raise
-
-
-@dataclass(frozen=True)
-class Processes:
-    """Spawned processes: for tasks that spend their time in Python.
-
-    The task is pickled, so it is a function at the top level of a module, a `functools.partial` of one, or
-    an instance of a class there. A script that uses it starts under ``if __name__ == "__main__":``.
-    """
-
-    workers: int
-
-    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
-        """Yield the chunks as they are finished."""
-        spawn = multiprocessing.get_context("spawn")
-        theirs, ours = spawn.Pipe(duplex=False)
-        with theirs, ProcessPoolExecutor(self.workers, spawn, _live_with, (theirs,)) as pool, ours:
-            yield from _as_finished(pool, work, chunks)
-            pool.shutdown()
-
-
-@dataclass(frozen=True)
-class _Borrowed:
-    """A pool that somebody else made, and ends."""
-
-    pool: Pool
-
-    def map(self, work: Work, chunks: Sequence[range]) -> Finished:
-        """Yield the chunks as they are finished."""
-        pending: dict[Future[Sample], range] = {self.pool.submit(work, chunk): chunk for chunk in chunks}
-        try:
-            for future in as_completed(list(pending)):
-                yield pending.pop(future), future.result()
-        finally:
-            for future in pending:
-                future.cancel()
-            wait(pending)
-
-
-def _as_finished(pool: Pool, work: Work, chunks: Sequence[range]) -> Finished:
-    """Yield the chunks as the pool finishes them, holding no result longer than that."""
-    pending: dict[Future[Sample], range] = {pool.submit(work, chunk): chunk for chunk in chunks}
-    for future in as_completed(pending):
-        yield pending.pop(future), future.result()
-
-
-def _live_with(parent: Connection) -> None:
-    """Make this worker leave Ctrl-C to its parent, and end once the parent hangs up, or was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def end_with_parent() -> None:
-        with suppress(EOFError, OSError):
-            parent.recv_bytes()
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def generator(seed: int, run: int) -> np.random.Generator:
@@ -233,42 +112,51 @@ def run(
     """
     if runs < 1 or (chunk is not None and chunk < 1) or seed < 0:
         raise InputError("run", f"got runs={runs}, chunk={chunk}, seed={seed}, expected 1, 1, 0 or more")
-    size = chunk or -(-runs // 64)
-    chunks = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
+    chunks = divided(runs, chunk)
     done: dict[int, Sample] = {}  # by the number of the chunk's first run
     if folder is not None:
         folder = Path(folder)
-        _open(folder, _manifest(task, seed, runs, size))
+        _open(folder, _manifest(task, seed, runs, len(chunks[0])))
         done = {c.start: kept for c in chunks if (kept := _kept(folder, c)) is not None}
 
     missing = [c for c in chunks if c.start not in done]
     count = runs - sum(map(len, missing))
     if progress:
         progress(count, runs)
-    place = _Borrowed(executor) if isinstance(executor, Pool) else executor or Serial()
-    with closing(place.map(partial(_do, task, seed), missing)) as finished:
-        for c, sample in finished:
-            if folder is not None:
-                _keep(folder, c, sample)
-            done[c.start] = sample
-            count += len(c)
-            if progress:
-                progress(count, runs)
+    for c, sample in computed(executor, _Runs(task, seed), missing):
+        if folder is not None:
+            _keep(folder, c, sample)
+        done[c.start] = sample
+        count += len(c)
+        if progress:
+            progress(count, runs)
     return _join(done, seed)
 
 
-def _do(task: Task, seed: int, numbers: Iterable[int]) -> Sample:
-    """Do the runs with these numbers."""
-    done: dict[int, Sample] = {}
-    for number in numbers:
-        try:
-            returned = task(generator(seed, number))
-            done[number] = {
-                k: np.asarray(value, dtype=np.float64)[np.newaxis] for k, value in returned.items()
-            }
-        except Exception as error:
-            raise RunError(number, seed, f"{type(error).__name__}: {error}") from error
-    return _join(done, seed)
+@dataclass(frozen=True)
+class _Runs:
+    """The runs of a campaign by their numbers."""
+
+    task: Task
+    seed: int
+
+    def __call__(self, numbers: Iterable[int]) -> Sample:
+        """Do the runs with these numbers."""
+        done: dict[int, Sample] = {}
+        for number in numbers:
+            try:
+                returned = self.task(generator(self.seed, number))
+                done[number] = {
+                    k: np.asarray(value, dtype=np.float64)[np.newaxis] for k, value in returned.items()
+                }
+            except Exception as error:
+                raise RunError(number, self.seed, f"{type(error).__name__}: {error}") from error
+        return _join(done, self.seed)
+
+    def prepare(self) -> None:
+        """Make ready what the task needs, where it says how."""
+        if hasattr(self.task, "prepare"):
+            self.task.prepare()
 
 
 def _join(parts: Mapping[int, Sample], seed: int) -> Sample:

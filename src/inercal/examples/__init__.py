@@ -117,6 +117,13 @@ EXAMPLES: dict[str, Example] = {
             verb="temperature",
         ),
         Example(
+            "tumble",
+            "three accelerometers on a two-axis turntable, 24 positions of 20 s at 2 Hz, simulated",
+            ("tumble.csv.gz",),
+            study="tumble.toml",
+            verb="calibrate turntable",
+        ),
+        Example(
             "five-years",
             "gyrowheel tumbled on a table four times a year from 2021 to 2025, simulated: one drift ages, one wanders",
             tuple(f"gyro-{day}.csv" for day in _DAYS),

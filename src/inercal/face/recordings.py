@@ -21,6 +21,7 @@ from inercal.records.titles import name_and_unit
 from inercal.units import Unit, parse_quantity, parse_unit
 
 if TYPE_CHECKING:
+    from inercal.face.study import Study
     from inercal.records.maps import RecordMap
 
 GIVEN = Source("arrays", "")
@@ -75,6 +76,21 @@ def read(
     from inercal.records.read import read as read_files
 
     return read_files(paths, map, counted=counted).between(begin, end)
+
+
+def repeats(paths: Sequence[str | Path], study: Study, map: str | Path | None = None) -> list[Record]:
+    """Read the records that a study is of: files with distinct channels are one, with the same ones repeat runs.
+
+    Raises `InputError` as `read`.
+    """
+    from inercal.records.read import read_runs
+
+    counted = False
+    if study.kind == "imu":
+        from inercal.imu.task import in_rows
+
+        counted = in_rows(study.settings)
+    return read_runs(paths, map, counted=counted)
 
 
 def record(

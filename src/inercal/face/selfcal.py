@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import InputError
+from inercal.estimate.executors import Executor
 from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by, of_files, with_span
 from inercal.records.record import Record
@@ -119,21 +120,28 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 def prepare_design(study: Study) -> None:
     """Load, or compile, the kernels of `design`."""
     from inercal.selfcal.before.bounds import bounds
+    from inercal.selfcal.before.left_out import left_out, shifts
     from inercal.selfcal.filters.problem import problem
     from inercal.selfcal.platform.plan import Plan, Rest, motion
 
     settings = study.settings
     with study.at_fault():
-        bounds(motion(Plan((Rest(0.2),)), settings.world), problem(settings))
+        resting, of = motion(Plan((Rest(0.2),)), settings.world), problem(settings)
+        bounds(resting, of)
+        shifts(resting, of, left_out(settings))
 
 
-def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
+def design(
+    study: Study, progress: Callable[[int, int], None] | None = None, executor: Executor | None = None
+) -> Result:
     """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.Designed`."""
     from inercal.selfcal.before.path_design import REFERENCES
     from inercal.selfcal.before.path_design import design as search
 
-    by = () if progress is None else (progress,)
-    designed, result = designed_by("design selfcal", study, lambda: search(study.settings, *by), REFERENCES)
+    say = progress or (lambda done, total: None)
+    designed, result = designed_by(
+        "design selfcal", study, lambda: search(study.settings, say, executor), REFERENCES
+    )
 
     def page() -> str:
         from inercal.selfcal.figures.design import page as of_page

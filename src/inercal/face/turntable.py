@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from inercal.estimate.executors import Executor
 from inercal.estimate.result import without_coefficients
 from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by
@@ -68,13 +69,13 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
         return task.simulate(study.settings, rng)
 
 
-def design(study: Study, progress: Progress = lambda _: None) -> Result:
+def design(study: Study, progress: Progress = lambda _: None, executor: Executor | None = None) -> Result:
     """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 
     designed, result = designed_by(
-        "design positions", study, lambda: planned(study.settings, progress), REFERENCES
+        "design positions", study, lambda: planned(study.settings, progress, executor), REFERENCES
     )
 
     def page() -> str:
@@ -139,6 +140,7 @@ def sensitivity(
     maps: bool = True,
     say: Progress = lambda _: None,
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Result:
     """Influence of each error of the table; ``evidence`` is the `inercal.turntable.sensitivity.analysis.Analysed`.
 
@@ -148,7 +150,7 @@ def sensitivity(
     from inercal.turntable.sensitivity.analysis import analyse, result, table
 
     with study.at_fault():
-        analysed = analyse(study.settings, maps, say, progress)
+        analysed = analyse(study.settings, maps, say, progress, executor)
     estimate = without_coefficients(
         "sensitivity",
         analysed.message,

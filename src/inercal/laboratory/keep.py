@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +14,9 @@ from sqlalchemy import Connection, insert, select
 from inercal.errors import InputError
 from inercal.estimate.files import plain_objects, to_json
 from inercal.estimate.result import Estimate
+from inercal.inputs import program
 from inercal.laboratory.chain import digest_of, happened, now
-from inercal.laboratory.database import writing
+from inercal.laboratory.database import reading, writing
 from inercal.laboratory.store import Store
 from inercal.laboratory.tables import Coefficient, Instrument, Recording, Reference, Result, SourceOf, Used
 
@@ -81,25 +80,13 @@ def id_of(data: Mapping[str, Any]) -> str:
     return digest_of({**{k: v for k, v in data.items() if k != "timing_s"}, "provenance": provenance})
 
 
-@cache
-def program() -> str:
-    """SHA-256 of the sources of this program."""
-    import inercal
-
-    digest = hashlib.sha256()
-    root = Path(inercal.__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def keep(
     store: Store,
     estimate: Estimate,
     item: Item | None,
     report: bytes | None = None,
     saved: Mapping[str, Any] | None = None,
+    copies: Mapping[str, Path] | None = None,
 ) -> Kept:
     """Keep a result with the files it rests on.
 
@@ -114,6 +101,8 @@ def keep(
     saved : mapping, optional
         The JSON of a result that was made elsewhere, of which each key is kept as it is; without it this program made
         the result, just now: its files must be as they were, and the checksum of the sources is kept.
+    copies : mapping, optional
+        Files of this machine by the path that the result says, where that is a URL.
 
     Raises
     ------
@@ -128,7 +117,7 @@ def keep(
     data = to_json(estimate) | plain_objects(saved or {})
     made_here = saved is None
     identity = id_of(data)
-    files, notes = _files(store, estimate, made_here)
+    files, notes = _files(store, estimate, made_here, copies or {})
     text = json.dumps(data, indent=1, ensure_ascii=False) + "\n"
     result = {
         "id": identity,
@@ -160,6 +149,15 @@ def keep(
         add_rows(connection, rows, number)
         happened(connection, "keep", identity, rows.digest)
     return Kept(identity, True, tuple(notes))
+
+
+def kept_already(store: Store, estimate: Estimate, saved: Mapping[str, Any]) -> str | None:
+    """Identity of a result in the store, whatever instrument it was kept under; None where it is not there."""
+    identity = id_of(to_json(estimate) | plain_objects(saved))
+    with reading(store.engine, store.where) as connection:
+        return (
+            identity if connection.execute(select(Result.id).where(Result.id == identity)).first() else None
+        )
 
 
 @dataclass(frozen=True)
@@ -259,15 +257,18 @@ def _reference(connection: Connection, row: Mapping[str, str]) -> int:
     return number
 
 
-def _files(store: Store, estimate: Estimate, made_here: bool) -> tuple[list[dict[str, Any]], list[str]]:
+def _files(
+    store: Store, estimate: Estimate, made_here: bool, copies: Mapping[str, Path]
+) -> tuple[list[dict[str, Any]], list[str]]:
     """Rows of the files that a result rests on, which become objects, and notes on those that could not."""
     rows, notes = [], []
     for source in {each.sha256: each for each in estimate.inputs}.values():
-        path = _place(source.path)
+        path = copies.get(source.path) or _place(source.path)
+        place = source.path if "://" in source.path else str(path.absolute())
         try:
             size = path.stat().st_size
             if size > LARGE:
-                rows.append({"sha256": source.sha256, "bytes": size, "place": str(path.absolute())})
+                rows.append({"sha256": source.sha256, "bytes": size, "place": place})
                 notes.append(f"{source.path}: {size / 2**30:.1f} GiB, kept by its path and checksum")
                 continue
             store.objects.add_file(path, source.sha256)
@@ -279,7 +280,7 @@ def _files(store: Store, estimate: Estimate, made_here: bool) -> tuple[list[dict
                     if isinstance(error, InputError)
                     else InputError(path, f"cannot be read ({error.strerror})")
                 ) from error
-            rows.append({"sha256": source.sha256, "bytes": None, "place": str(path.absolute())})
+            rows.append({"sha256": source.sha256, "bytes": None, "place": place})
             why = error.message if isinstance(error, InputError) else f"cannot be read ({error.strerror})"
             notes.append(f"{source.path}: {why}; kept by its checksum alone")
     return rows, notes

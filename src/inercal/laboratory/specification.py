@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from inercal.errors import InputError
 from inercal.units import parse_unit
+
+if TYPE_CHECKING:
+    from inercal.estimate.result import Estimate
 
 Verdict = Literal["conform", "not conform"]
 
@@ -60,6 +63,11 @@ class Specification:
             for value, text in (found.low, found.high)
         )
         return low, high
+
+    def without_value(self, names: Iterable[str]) -> list[str]:
+        """The names of limits that belong to none of the coefficients ``names``."""
+        there = {each for name in names for each in (name, group_of(name))}
+        return [key for key in self.limits if key not in there]
 
 
 def specification_of(table: Mapping[str, Any], where: object) -> Specification:
@@ -154,3 +162,14 @@ def conformity(
     if specification.risk is not None:
         inside = probability >= 1.0 - specification.risk
     return Conformity(low, high, probability, "conform" if inside else "not conform", specification.rule)
+
+
+def judged(estimate: Estimate, specification: Specification) -> dict[str, Conformity]:
+    """Conformity of each coefficient that has limits."""
+    shown = estimate.shown_units()
+    found = {}
+    for p in estimate.parameters.values():
+        limits = specification.of(p.name, p.unit, shown[p.name])
+        if limits is not None:
+            found[p.name] = conformity(specification, limits, p.value, p.u, p.U, p.dof)
+    return found

@@ -17,6 +17,8 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"gyro_[xyz]", ("rate", *RAW), "angle"),
     (r"gyro|gyro_roll|gyro_yaw", ("rate", "count", "voltage"), "angle"),
     (r"wc_[xyz]", ("rate", "count"), "angle"),
+    (r"th_rate_[xyz]", ("rate", "count"), None),
+    (r"th_acc_[xyz]", ("rate ramp", "count"), None),
     (r"y_[xy]", ("rate", "number", *RAW), None),
     (r"phi[123]|th_[xyz]|theta_ref", ("angle", "count", "voltage"), None),
     (r"q_ref_[0-3]", ("number",), None),
@@ -30,7 +32,7 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
 )
 
 _EXAMPLES = (
-    *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th") for axis in "xyz"),
+    *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th", "th_rate", "th_acc") for axis in "xyz"),
     *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "joint", "y_x", "y_y"),
     *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref", "q_ref_0"),
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,21 +60,57 @@ class Distribution:
 
     def scaled(self, factor: float) -> Distribution:
         """The same shape, ``factor`` times as wide (about zero)."""
-        quantile = self.quantile
         return Distribution(
             self.kind,
             self.size * factor,
             self.nodes * factor,
             self.weights,
-            lambda p: np.asarray(quantile(p) * factor),
+            partial(_scaled, self.quantile, factor),
         )
+
+
+# Functions of the module and no others: a distribution can then be sent to another process.
+
+
+def _scaled(quantile: Callable[[Array], Array], factor: float, p: Array) -> Array:
+    """Quantiles of the same shape, ``factor`` times as wide."""
+    return np.asarray(quantile(p) * factor)
+
+
+def _of_uniform(half: float, p: Array) -> Array:
+    """Quantiles of a uniform error."""
+    return half * (2.0 * p - 1.0)
+
+
+def _of_normal(sigma: float, p: Array) -> Array:
+    """Quantiles of a normal error."""
+    from scipy.special import ndtri
+
+    return np.asarray(sigma * ndtri(np.clip(p, 2.0**-54, None)))
+
+
+def _of_triangular(half: float, p: Array) -> Array:
+    """Quantiles of a triangular error."""
+    return np.asarray(
+        half * np.where(p < 0.5, np.sqrt(2.0 * p) - 1.0, 1.0 - np.sqrt(2.0 * np.maximum(1.0 - p, 0.0)))
+    )
+
+
+def _of_two_points(half: float, p: Array) -> Array:
+    """Quantiles of one of two sizes."""
+    return np.where(p < 0.5, -half, half)
+
+
+def _of_density(cumulative: Array, grid: Array, p: Array) -> Array:
+    """Quantiles of a density with its ``cumulative`` sums on a ``grid``."""
+    return np.asarray(np.interp(p * cumulative[-1], cumulative, grid))
 
 
 def uniform(half_width: float) -> Distribution:
     """Uniform on ±``half_width``."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     half = _positive(half_width)
-    return Distribution("uniform", half, half * nodes, 0.5 * weights, lambda p: half * (2.0 * p - 1.0))
+    return Distribution("uniform", half, half * nodes, 0.5 * weights, partial(_of_uniform, half))
 
 
 def normal(std: float) -> Distribution:
@@ -82,27 +118,18 @@ def normal(std: float) -> Distribution:
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     sigma = _positive(std)
 
-    def quantile(p: Array) -> Array:
-        from scipy.special import ndtri
-
-        return np.asarray(sigma * ndtri(np.clip(p, 2.0**-54, None)))
-
-    return Distribution("normal", sigma, sigma * nodes, weights / weights.sum(), quantile)
+    return Distribution("normal", sigma, sigma * nodes, weights / weights.sum(), partial(_of_normal, sigma))
 
 
 def triangular(half_width: float) -> Distribution:
     """Symmetric triangular on ±``half_width``: the sum of two equal uniform errors."""
     half = _positive(half_width)
 
-    def quantile(p: Array) -> Array:
-        return np.asarray(
-            half * np.where(p < 0.5, np.sqrt(2.0 * p) - 1.0, 1.0 - np.sqrt(2.0 * np.maximum(1.0 - p, 0.0)))
-        )
-
     x, w = np.polynomial.legendre.leggauss(NODES // 2)
     up = 0.5 * (x + 1.0)  # 0 to 1, on either side of the peak
     nodes, weights = np.concatenate([-up[::-1], up]), 0.5 * w * (1.0 - up)
-    return Distribution("triangular", half, half * nodes, np.concatenate([weights[::-1], weights]), quantile)
+    weights = np.concatenate([weights[::-1], weights])
+    return Distribution("triangular", half, half * nodes, weights, partial(_of_triangular, half))
 
 
 def two_point(size: float) -> Distribution:
@@ -113,7 +140,7 @@ def two_point(size: float) -> Distribution:
         half,
         np.array([-half, half]),
         np.array([0.5, 0.5]),
-        lambda p: np.where(p < 0.5, -half, half),
+        partial(_of_two_points, half),
     )
 
 
@@ -141,11 +168,8 @@ def density(pdf: Callable[[Array], ArrayLike], low: float, high: float) -> Distr
     if abs(cumulative[-1] * (grid[1] - grid[0]) / total - 1.0) > 1e-3:
         raise ValueError(f"found a density too rough or too narrow for {NODES} nodes, expected a smooth one")
 
-    def quantile(p: Array) -> Array:
-        return np.asarray(np.interp(p * cumulative[-1], cumulative, grid))
-
     std = float(np.sqrt(weights @ np.square(nodes - weights @ nodes)))
-    return Distribution("density", std, nodes, weights, quantile)
+    return Distribution("density", std, nodes, weights, partial(_of_density, cumulative, grid))
 
 
 def _positive(size: float) -> float:

@@ -91,6 +91,10 @@ class Limits:
     """Time [s] over which a bias that walks is correlated: within it a random walk, beyond it as far from its mean as
     before. A walk of 0.35 ug/sqrt(s) is then like 1/f noise whose Allan deviation has its floor at 1 ug."""
 
+    slow_time: float = 5.0
+    """Time [s] over which innovations of accelerometers are correlated where their biases wander and no state of the
+    model follows: slower wandering is taken up by coefficients."""
+
     still_joint: float = math.radians(1.0 / 60.0)
     """Range [rad] of a joint's angle below which it stands still: non-orthogonality of 20 arcsec then turns the
     platform by less than 0.01 arcsec otherwise than gamma and beta."""

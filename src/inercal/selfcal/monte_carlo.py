@@ -14,7 +14,8 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import InputError
-from inercal.estimate.runs import Executor, Threads, run
+from inercal.estimate.executors import Executor, Threads
+from inercal.estimate.runs import run
 from inercal.geometry.rotations import boxminus, conjugate
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.selfcal.before.simulate import Experiment, Simulated, experiment, simulate

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.errors import RecordError
+from inercal.errors import RecordError, StudyError
 from inercal.findings import Finding
 from inercal.records.column import Column
 from inercal.records.places import counted, places
@@ -21,11 +21,13 @@ from inercal.records.record import Record, recorded_temperature
 from inercal.selfcal.diagnosis.gross import clipped, implausible, off_the_path
 from inercal.selfcal.filters.gaps import walked, with_held
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.kinematics import TWO_PI
+from inercal.selfcal.platform.kinematics import TWO_PI, commanded_rates
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.platform.states import TEMPERATURE
 from inercal.selfcal.settings import SelfcalSettings
+
+_OF_JOINTS = "th_rate"
 
 _REFERENCE = ("q_ref_0", "q_ref_1", "q_ref_2", "q_ref_3")
 
@@ -35,7 +37,8 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     study.
 
     The record has ``th_x..z``, but of joints that the study states as fixed, ``acc_x..z``, and the platform's rate,
-    commanded (``wc_x..z``) or, where there is no such, measured (``gyro_x..z``), on one clock; it may have the true
+    commanded (``wc_x..z``) or, where there is no such, measured (``gyro_x..z``), or else the rates commanded to the
+    joints (``th_rate_x..z``, with ``th_acc_x..z`` where they change within a step), on one clock; it may have the true
     attitude, ``q_ref_0..3``. A rate belongs to the interval from its row to the next, one recorded as an increment to
     the interval before; the last row's rate (or the first increment) is not used.
 
@@ -53,6 +56,7 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
             text = f"{column.name} has another clock than {columns[0].name}, expected one row for all at each time"
             raise RecordError(where, text)
     values = {name: column.si() for name, column in zip(names, columns, strict=True)}
+    accelerations = _accelerations(record, columns[0]) if sensor == _OF_JOINTS else None
     values |= {name: np.full(len(columns[0].t), angle) for name, angle in unread.items()}
     rate, th, acc = (
         np.stack([values[f"{name}_{axis}"] for axis in "xyz"], axis=-1) for name in (sensor, "th", "acc")
@@ -69,6 +73,9 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     findings += _lacking(rate, rows, sensor)
     findings += _gaps(t, record)
     th, turned = _continuous(th)
+    if sensor == _OF_JOINTS:
+        gained = 0.0 if accelerations is None else 0.5 * accelerations[rows[:-1]] * np.diff(t)[:, None]
+        rate = _of_platform(t, th, rate + gained, settings)
     if turned and all(finding.code != "wrap_2pi" for finding in record.findings):
         findings.append(Finding("wrap_2pi", f"{', '.join(turned)}: jumps by a full turn, taken out"))
     recorded_rate = rate
@@ -96,6 +103,41 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     return replace(recording, findings=(*of_record, *findings))
 
 
+def _accelerations(record: Record, rate: Column) -> Array | None:
+    """Accelerations (n, 3) [rad/s^2] commanded to the joints, 0 where they are no numbers; None without them."""
+    names = [f"th_acc_{axis}" for axis in "xyz"]
+    if not set(names) <= record.columns.keys():
+        return None
+    columns = [record[name] for name in names]
+    if any(column.t is not rate.t for column in columns):
+        where = record.sources[0].path if record.sources else "record"
+        text = f"{columns[0].name} has another clock than {rate.name}, expected one row for all at each time"
+        raise RecordError(where, text)
+    return np.nan_to_num(np.stack([column.si() for column in columns], axis=-1))
+
+
+def _of_platform(t: Array, th: Array, rate: Array, settings: SelfcalSettings) -> Array:
+    """Rates (n - 1, 3) [rad/s] of the platform against inertial space that a drive commands, whose joints are to turn
+    with ``rate`` (n - 1, 3) [rad/s]: at the angles at which they would then be, from the start of the study's plan on.
+
+    Where no rate is recorded the joints turn as they are read. Raises StudyError without a plan: angles as read have
+    noise, which would turn all rates of a path.
+    """
+    if settings.plan is None:
+        text = (
+            "missing, expected the angles from which the joints were commanded by th_rate_x..z as its start"
+        )
+        raise StudyError("plan", text)
+    known, dt = np.asarray(np.isfinite(rate).all(axis=1)), np.diff(t)[:, None]
+    turns = np.where(known[:, None], rate * dt, np.nan_to_num(np.diff(th, axis=0)))
+    start = np.array([settings.plan.start])
+    nominal = np.vstack([start, start + np.cumsum(turns, axis=0)])
+    world, wanted = settings.world, np.empty((len(rate), 3))
+    commanded_rates(nominal, dt[:, 0], world.earth, world.axes, world.signs, wanted)
+    wanted[~known] = np.nan
+    return wanted
+
+
 def _warm(record: Record, settings: SelfcalSettings, t: Array, where: str) -> Array | None:
     """The temperature at times ``t`` (n,) [s], above that of the coefficients; None without one, which is refused where
     coefficients are to change with it."""
@@ -119,9 +161,11 @@ def as_recorded(record: Record, settings: SelfcalSettings) -> SelfcalSettings:
 
 
 def _rate_sensor(record: Record, settings: SelfcalSettings, where: str) -> str:
-    """``wc`` or ``gyro``, whichever is there whole; refuses a record without all columns."""
+    """``wc``, ``gyro`` or ``th_rate``, whichever is there whole; refuses a record without all columns."""
     filled = {name for name, column in record.columns.items() if np.isfinite(column.values).any()}
-    there = [sensor for sensor in ("wc", "gyro") if filled >= {f"{sensor}_{axis}" for axis in "xyz"}]
+    there = [
+        sensor for sensor in ("wc", "gyro", _OF_JOINTS) if filled >= {f"{sensor}_{axis}" for axis in "xyz"}
+    ]
     wanted = [f"{name}_{axis}" for name in ("th", "acc") for axis in "xyz"]
     missing = [name for name in wanted if name not in record and name not in settings.fixed]
     if not there or missing:
@@ -130,7 +174,8 @@ def _rate_sensor(record: Record, settings: SelfcalSettings, where: str) -> str:
         of_angle = " (a joint that does not turn is stated by rig.fixed)" if {*missing} & {*JOINTS} else ""
         raise RecordError(
             where,
-            f"found {lacking} among {among}, expected t, wc_x..z (or gyro_x..z), th_x..z, acc_x..z{of_angle}",
+            f"found {lacking} among {among}, expected t, wc_x..z (or gyro_x..z, or th_rate_x..z), th_x..z, acc_x..z"
+            f"{of_angle}",
         )
     return there[0]
 
@@ -144,7 +189,7 @@ def worth_saying(record: Record, columns: Collection[Column]) -> list[Finding]:
         f"{column.name}: 1 missing value"
         for column in columns
         if np.flatnonzero(np.isnan(column.values)).tolist() == [needless[column.name]]
-        and not column.name.startswith("th")
+        and column.sensor != "th"
     }
     return [each for each in record.findings if each.code != "nan" or each.message not in empty]
 

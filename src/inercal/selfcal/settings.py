@@ -15,6 +15,7 @@ from inercal.geometry.site import Site
 from inercal.keys import PART, REQUIRED, TIME, Bounds, above_zero, option, quantities, quantity, within
 from inercal.selfcal.estimators import FactorKind, FilterKind
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.joint_limits import JointLimits
 from inercal.selfcal.platform.plan import Plan
 from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 from inercal.selfcal.platform.states import (
@@ -69,6 +70,11 @@ class Noise:
         "root mean square along each axis, faster than the rows, noise to the accelerometers", "acceleration", "0 ug",
         example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
     )  # fmt: skip
+
+    @property
+    def unsteady(self) -> bool:
+        """True where the base is stated to sway or to vibrate, which is no white noise."""
+        return self.base_sway > 0.0 or self.vibration > 0.0
 
     @property
     def of_readings(self) -> Noise:
@@ -190,7 +196,7 @@ class Disturbances:
 
 @dataclass(frozen=True)
 class Search:
-    """The search for a path."""
+    """The search for a path; errors of the kinds ``robust``, which are no states, count beside the bound."""
 
     turns: int = option("how many at most", 5, least=1, most=50)
     angle: float = quantity("turns are multiples of it", "angle", "30 deg", bounds=_OF_A_TURN)
@@ -200,6 +206,11 @@ class Search:
     criterion: Literal["worst", "mean"] = option(
         "the mean of all uncertainties on a log scale, or the largest over goal or prior (worst)", "mean"
     )
+    closed: bool = option("the path ends at the angles where it began", False)
+    rest: float = quantity(
+        "after each turn", "time", "0 s", example="10 s", bounds=within(0.0, math.inf, "a time of 0 or more")
+    )
+    robust: tuple[str, ...] = ()
     seed: int = option("of the random starts", 1, least=0)
 
 
@@ -229,7 +240,8 @@ class SelfcalSettings:
     """A study of self-calibration, in SI.
 
     ``site`` with its uncertainties; ``gimbals`` and ``base`` the rig, its heading to be found from the record where
-    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name, and the angle [rad] of each joint
+    ``heading_unknown``; ``limits`` (low, high) [rad] of a gimbal angle by its name, ``joints`` what limits them else,
+    and the angle [rad] of each joint
     that is ``fixed``, on a rig of one or two axes, and has no encoder; ``plan`` None where a record is
     enough. ``prior`` (24,) standard deviations of the coefficients about 0, in the order of
     `inercal.selfcal.platform.coefficients`; ``truth`` (24,), (K,) with the rig's, or None, product form, for
@@ -245,6 +257,7 @@ class SelfcalSettings:
     base: Base = field(default_factory=Base)
     heading_unknown: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    joints: JointLimits = field(default_factory=JointLimits)
     fixed: Mapping[str, float] = field(default_factory=dict)
     plan: Plan | None = None
     truth: Array | None = None

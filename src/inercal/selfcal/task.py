@@ -15,9 +15,11 @@ from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.estimate.table import Table
 from inercal.records.record import Record
+from inercal.selfcal.before import considered
 from inercal.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.estimators import KINDS, FilterKind
+from inercal.selfcal.filters import averaged
 from inercal.selfcal.filters import run as filtering
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import taken_anew
@@ -62,6 +64,8 @@ def load_kernels(settings: SelfcalSettings, compare: bool = False) -> None:
     none = np.empty((0, 3))
     empty = Recording(np.empty(0), none, none, none)
     recorded_bounds(empty, of, np.empty((0, 4)), np.zeros(len(of.prior)), contributions=True)
+    averaged.load_kernels(of)
+    considered.load_kernels(of)
 
 
 def calibrate(

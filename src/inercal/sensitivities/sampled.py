@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inercal.arrays import Array
+from inercal.estimate.executors import Executor, numbered
 from inercal.rigs.chain import Chain
 from inercal.rigs.distribution import Distribution
 from inercal.rigs.outputs import Output
@@ -139,6 +140,7 @@ def analyse(
     rng: np.random.Generator,
     sampling: Sampling = "sobol",
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Indices:
     """Estimated indices of outputs of a rig at ``angles`` (n, joints) [rad], with rows drawn anew at each position.
 
@@ -147,27 +149,20 @@ def analyse(
     samples : int, 2 or more
         Rows of A and of B, rounded up to a power of two for ``sampling = "sobol"`` (scrambled Sobol points; "random"
         are plain rows, as in the paper); `Indices.method` holds both numbers.
+    rng : Generator
+        Each position draws from a stream of its own that is spawned from it.
     progress : callable, optional
         Told the positions done and all of them.
+    executor : Executor, optional
+        Place in which the positions are computed; the digits are the same in any.
     """
     positions = np.atleast_2d(np.asarray(angles, dtype=float))
-    distributions = [error.distribution for error in chain.errors]
     sizes = np.array([np.linalg.norm(each.reference) * np.linalg.norm(each.axis) for each in outputs])
-    parts, ideal = [], []
-    for done, at in enumerate(positions, start=1):
-
-        def values(C_nb: Array) -> Array:
-            return np.stack([each.value(C_nb) for each in outputs], axis=-1)
-
-        A, B = draw(distributions, rows(samples, sampling), sampling, rng)
-        both = values(chain.attitude(at, A)), values(chain.attitude(at, B))
-        parts.append(estimate(*both, values(chain.exchanged(at, A, B)), RESAMPLES, rng))
-        ideal.append(values(chain.attitude(at)))
-        if progress is not None:
-            progress(done, len(positions))
+    work = _Position(chain, tuple(outputs), positions, samples, sampling, tuple(rng.spawn(len(positions))))
+    found = numbered(work, len(positions), executor, progress)
     return _indices(
-        parts,
-        np.array(ideal),
+        [parts for parts, _ in found],
+        np.array([ideal for _, ideal in found]),
         _ROUNDING * sizes,
         factors=chain.factors,
         outputs=tuple(each.name for each in outputs),
@@ -176,6 +171,31 @@ def analyse(
         angles=positions,
         method=_method(samples, sampling),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Position:
+    """The estimate at each of ``positions`` (n, joints) [rad], from its own stream of ``rngs``."""
+
+    chain: Chain
+    outputs: tuple[Output, ...]
+    positions: Array
+    samples: int
+    sampling: Sampling
+    rngs: tuple[np.random.Generator, ...]
+
+    def __call__(self, number: int) -> tuple[Parts, Array]:
+        """Estimated parts, and the outputs (o,) without errors."""
+        chain, at, rng = self.chain, self.positions[number], self.rngs[number]
+
+        def values(C_nb: Array) -> Array:
+            return np.stack([each.value(C_nb) for each in self.outputs], axis=-1)
+
+        distributions = [error.distribution for error in chain.errors]
+        A, B = draw(distributions, rows(self.samples, self.sampling), self.sampling, rng)
+        f_AB = values(chain.exchanged(at, A, B))
+        parts = estimate(values(chain.attitude(at, A)), values(chain.attitude(at, B)), f_AB, RESAMPLES, rng)
+        return parts, values(chain.attitude(at))
 
 
 def analyse_function(

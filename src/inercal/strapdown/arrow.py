@@ -84,18 +84,17 @@ def add_interval(
 
 
 @kernel
-def add_node(v: Array, angles: Array, known: Array, at: int, m: int, H: Array, g: Array) -> None:
-    """Add the rows of a node, whose state begins ``at``, to H and g; ``known`` (2,) is the information of its velocity
-    ``v`` (3,) and its ``angles`` (3,)."""
+def add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, H: Array, g: Array) -> None:
+    """Add the rows of a node to H and g, of its velocity ``v`` (3,) and its ``angles`` (3,), each with its
+    information."""
     for i in range(3):
-        H[at + 3 + i, at + 3 + i] += known[0]
-        g[at + 3 + i] -= known[0] * v[i]
-        a, b, attitude = at + i, m + i, known[1]
-        H[a, a] += attitude
+        H[3 + i, 3 + i] += velocity
+        g[3 + i] -= velocity * v[i]
+        b = m + i
+        H[i, i] += attitude
         H[b, b] += attitude
-        H[a, b] -= attitude
-        H[b, a] -= attitude
-        g[a] -= attitude * angles[i]
+        H[i, b] -= attitude
+        g[i] -= attitude * angles[i]
         g[b] += attitude * angles[i]
 
 
@@ -112,7 +111,8 @@ def cleared(H: Array, g: Array, begin: int, end: int) -> None:
 def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
     """Put the next node in the place of the one that was eliminated, with its angles where the rest ``ends``."""
     n, by = len(g), m + 3
-    cleared(H, g, 0, m + 3 if ends else m)
+    if ends:
+        cleared(H, g, m, by)
     for i in range(m):
         for j in range(i, m):
             H[i, j] = H[by + i, by + j]
@@ -125,11 +125,18 @@ def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
 
 
 @kernel
-def begun(information: Array, x: Array, at: int, H: Array, g: Array) -> None:
-    """Set in H and g what is known beforehand of the unknowns from ``at`` on, which deviate by ``x`` (q,)."""
-    for i in range(len(x)):
-        H[at + i, at + i] = information[i]
-        g[at + i] = -information[i] * x[i]
+def begun(start: Array, begin: Array, prior: Array, c: Array, H: Array, g: Array) -> None:
+    """Set H and g to what is known beforehand of the first node and of the coefficients, as in `Chain`."""
+    n, p = len(g), len(c)
+    for i in range(n):
+        g[i] = 0.0
+        for j in range(n):
+            H[i, j] = 0.0
+    for i in range(len(start)):
+        H[i, i], g[i] = start[i], -start[i] * begin[i]
+    for i in range(p):
+        at = n - p + i
+        H[at, at], g[at] = prior[i], -prior[i] * c[i]
 
 
 @kernel
@@ -146,22 +153,15 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
     """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
     (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
     m, n, count = chain.F.shape[1], len(g), len(chain.rest)
-    gone, row, weighted = np.zeros(n), np.zeros((m, n)), np.zeros((m, n))
-    known = np.array([chain.velocity, chain.attitude])
-    cleared(H, g, 0, n)
-    begun(chain.start, chain.begin, 0, H, g)
-    begun(chain.prior, chain.c, 2 * m + 3, H, g)
+    gone, row, weighted = np.empty(n), np.empty((m, n)), np.empty((m, n))
+    begun(chain.start, chain.begin, chain.prior, chain.c, H, g)
     for k in range(count):
-        starts = k == 0 or chain.rest[k] != chain.rest[k - 1]
         ends = k == count - 1 or chain.rest[k + 1] != chain.rest[k]
-        if starts:
-            add_node(chain.v[k], chain.angles[k], known, 0, m, H, g)
+        add_node(chain.v[k], chain.velocity, chain.angles[k], chain.attitude, m, H, g)
         for i in range(n):
             gone[i] = 0.0
         if k < count - 1:
             add_interval(chain.F[k], chain.G[k], chain.e[k], chain.W[k], H, g, row, weighted)
-            if not ends:
-                add_node(chain.v[k + 1], chain.angles[k + 1], known, m + 3, m, H, g)
         eliminate(H, g, m + 3 if ends and chain.attitude > 0.0 else m, gone)
         kept(H, g, rows[k], right[k])
         moved_on(H, g, m, ends)
@@ -173,7 +173,7 @@ def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Ar
     ``c`` (p,)."""
     m = x.shape[1]
     n = rows.shape[2]
-    z = np.zeros(n)
+    z = np.empty(n)
     for k in range(len(rest) - 1, -1, -1):
         last = k == len(rest) - 1
         ends = last or rest[k + 1] != rest[k]
@@ -242,7 +242,7 @@ def followed(chain: Chain, rows: Array, Z: Array, out: Array, coupled: Array, no
     interval ``coupled`` (k, m, p) and of each node and the reference of its rest ``nodes`` (k + 1, m + 3, p); ``Z``
     (n, n) begins with the covariance (p, p) of the coefficients at its end and zeros before."""
     m, n = chain.F.shape[1], len(Z)
-    row = np.zeros(n)
+    row = np.empty(n)
     for k in range(len(chain.rest) - 1, -1, -1):
         last = k == len(chain.rest) - 1
         ends = last or chain.rest[k + 1] != chain.rest[k]

@@ -317,9 +317,7 @@ def _bounds(designed: Designed) -> Table:
     for name, u, prior, goal in zip(
         along.names, along.u.tolist(), along.prior.tolist(), designed.goal.tolist(), strict=True
     ):
-        unit, size = shown_unit(TERMS[name].unit_for("m/s^2" if name.startswith("K") else "rad/s"))
-        if "(rad/s)/(rad/s)" in unit or "(m/s^2)/(m/s^2)" in unit:
-            unit, size = shown_unit("1")
+        unit, size = unit_of(name)
         rows.append((name, short(u / size), unit, f"{100.0 * u / prior:.3g} %", f"{u / goal:.3g}"))
     return Table(
         "Bounds",
@@ -327,6 +325,13 @@ def _bounds(designed: Designed) -> Table:
         heads("coefficient", "bound u", "unit", "of prior", "of goal"),
         tuple(rows),
     )
+
+
+def unit_of(name: str) -> tuple[str, float]:
+    """The unit of a coefficient for people, and how many of the SI unit it is."""
+    unit, size = shown_unit(TERMS[name].unit_for("m/s^2" if name.startswith("K") else "rad/s"))
+    of_itself = "(rad/s)/(rad/s)" in unit or "(m/s^2)/(m/s^2)" in unit
+    return shown_unit("1") if of_itself else (unit, size)
 
 
 def _comparison(designed: Designed) -> Table:

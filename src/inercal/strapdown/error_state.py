@@ -2,15 +2,17 @@
 
 States are the errors x (m,) of the solution, those a (3,) of the reference attitude of the present rest, those (3,) of
 the attitude at the start, and those of the coefficients c (p,). The first pass is closed: errors are taken out of the
-solution at each node. Passes after it are open: along one solution, of the coefficients and the start of the pass
-before, the filter is linear, and begins with the prior as it is seen from there. That is Gauss-Newton by single
-shooting; a filter that goes on correcting its solution would be linearised at its own early headings. Where biases walk
-so far that an open solution tips over, it fails, and only the batch is left.
+solution at each node. Passes after it are open: along one solution the filter is linear, and begins with the prior as
+it is seen from there. The first open solution is of the coefficients and the start of the closed pass; each one after
+it is the one before with its errors at the nodes taken out, as the coefficients at its end have them. That is
+Gauss-Newton; a filter that goes on correcting its solution would be linearised at its own early headings. Where biases
+walk so far that an open solution tips over, it fails, and only the batch is left.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +100,23 @@ def measured(s: Array, P: Array, i: int, j: int, z: float, variance: float, colu
     return float(off * off / spread)
 
 
+class Path(NamedTuple):
+    """A solution at the nodes: attitude ``q`` (k, 4) C_nb and velocity ``v`` (k, 3)."""
+
+    q: Array
+    v: Array
+
+
+class Node(NamedTuple):
+    """A node of an open pass: attitude ``q`` (4,), velocity ``v`` (3,), their ``error`` (6,) but for what the errors of
+    start and coefficients do, and its ``gain`` (6, 3 + p) by these."""
+
+    q: Array
+    v: Array
+    error: Array
+    gain: Array
+
+
 class _Run:
     """One run over a recording with the coefficients ``c`` (51,), and the places ``free`` of those that are errors."""
 
@@ -111,6 +130,7 @@ class _Run:
         self.shot = empty_shot(1, self.m)
         self.s, self.nis, self.open = np.zeros(0), 0.0, False
         self.P = np.zeros((0, 0))
+        self.kept = list[Node]()
 
     def begun(self, off: Array, u: Array, deviation: Array, prior: Array) -> None:
         """Begin ``off`` (3,) the prior of the attitude, of ``u`` (3,), and ``deviation`` (p,) that of coefficients."""
@@ -155,15 +175,19 @@ class _Run:
         for i in range(3):
             self.nis += measured(self.s, self.P, i, m + i, -float(angles[i]), rests.attitude**2, column)
 
-    def through(self, q: Array, feed: bool) -> tuple[Array, Array]:
+    def through(self, q: Array, feed: bool, path: Path | None = None) -> tuple[Array, Array]:
         """Run from the attitude ``q`` (4,) of the first node to the last; ``feed`` takes errors out of the solution at
-        each node. Covariance (rests, p, p) of the coefficients and mean NIS (rests,) after each rest."""
+        each node, which otherwise goes on by itself or along a ``path``. Covariance (rests, p, p) of the coefficients
+        and mean NIS (rests,) after each rest."""
         v, bias, reference, m, self.open = np.zeros(3), np.zeros(6), q, self.m, not feed
         rest, history, nis, begun = self.nodes.rest, list[Array](), list[float](), 0
         for k in range(len(rest)):
             begins = k == 0 or rest[k] != rest[k - 1]
             if k:
                 q, v = self.on(k - 1, q, v, bias)
+                if path is not None:
+                    self.s[:6] += np.concatenate([log(multiply(q, conjugate(path.q[k]))), v - path.v[k]])
+                    q, v = path.q[k], path.v[k]
             if begins:
                 reference, begun = q, k
             self.at_rest(v, log(multiply(q, conjugate(reference))), begins)
@@ -171,12 +195,31 @@ class _Run:
                 q, v = normalize(multiply(exp(self.s[:3]), q)), v + self.s[3:6]
                 bias = bias + np.pad(self.s[6:m], (0, 12 - m))
                 self.s[:m] = 0.0
+            else:
+                self._keep(q, v)
             if k == len(rest) - 1 or rest[k + 1] != rest[k]:
                 history.append(self.P[m + 6 :, m + 6 :].copy())
                 rows = (3 if self.settings.rests.attitude is None else 6) * (k - begun) + 3
                 nis.append(self.nis / rows)
                 self.nis = 0.0
         return np.array(history), np.array(nis)
+
+    def _keep(self, q: Array, v: Array) -> None:
+        """Keep the solution at a node, its errors without those of the start and of the coefficients, and their
+        derivatives by these."""
+        constant = slice(self.m + 3, None)
+        size = np.sqrt(np.diag(self.P)[constant])
+        scaled = self.P[constant, constant] / np.outer(size, size)
+        gain = np.linalg.solve(scaled, self.P[constant, :6] / size[:, None]).T / size
+        self.kept.append(Node(q, v, self.s[:6] - gain @ self.s[constant], gain))
+
+    def path(self) -> Path:
+        """The solution at the nodes with its errors taken out, as the start and the coefficients at the end have them:
+        along it the next pass is linear."""
+        constant = self.s[self.m + 3 :]
+        errors = np.array([each.error + each.gain @ constant for each in self.kept])
+        q, v = np.array([each.q for each in self.kept]), np.array([each.v for each in self.kept])
+        return Path(normalize(multiply(exp(errors[:, :3]), q)), v + errors[:, 3:])
 
 
 def filtered(
@@ -195,13 +238,13 @@ def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, before:
     prior, c = settings.deviations()[free], first_coefficients(samples, nodes)
     at = beginning(freed(samples, c), nodes, settings)
 
-    def ran(q: Array, feed: bool) -> tuple[_Run, Array, Array]:
+    def ran(q: Array, feed: bool, path: Path | None = None) -> tuple[_Run, Array, Array]:
         run = _Run(samples, nodes, settings, c, free)
         off, u = log(multiply(at.q_nb, conjugate(q))), at.u
         if feed:  # a closed pass is of a start that is nearly known
             off, u = np.zeros(3), np.minimum(u, LIMITS.unknown_heading)
         run.begun(off, u, -c[free], prior)
-        return run, *run.through(q, feed)
+        return run, *run.through(q, feed, path)
 
     if before is None:
         tried = 1 if at.u[2] <= LIMITS.unknown_heading else LIMITS.headings
@@ -223,5 +266,6 @@ def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, before:
         done = size < LIMITS.step and (passes > 1 or before is not None)
         if done or passes >= LIMITS.filter_passes or not np.isfinite(size):
             return Filtered(c, q, covariance, passes, size < LIMITS.step, history, nis)
-        run, history, nis = ran(q, False)
+        path = run.path() if run.kept else None
+        run, history, nis = ran(q if path is None else path.q[0], False, path)
         passes += 1

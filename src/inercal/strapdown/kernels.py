@@ -175,9 +175,9 @@ def matrix(q: Quaternion, C: Array) -> None:
 
 
 @kernel
-def applied(M: Array, x: Array, at: int) -> Vector:
-    """M (3, 3) times the three numbers of x that begin ``at``."""
-    u, v, w = x[at], x[at + 1], x[at + 2]
+def applied(M: Array, x: Vector) -> Vector:
+    """M (3, 3) times a vector."""
+    u, v, w = x
     return (
         M[0, 0] * u + M[0, 1] * v + M[0, 2] * w,
         M[1, 0] * u + M[1, 1] * v + M[1, 2] * w,
@@ -208,7 +208,7 @@ def turned(turn: Array, sample: Whole, q: Array) -> None:
     for node in range(len(sample) - 1):
         of = (1.0, 0.0, 0.0, 0.0)
         for k in range(sample[node], sample[node + 1]):
-            of = normalize(multiply(of, exp(turn[k])))
+            of = normalize(multiply(of, exp((turn[k, 0], turn[k, 1], turn[k, 2]))))
         q[node, 0], q[node, 1], q[node, 2], q[node, 3] = of
 
 
@@ -230,16 +230,18 @@ def add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
 
 
 @kernel
-def sources(C: Array, sums: Array, dt: float, c: Gains, north: float, up: float, out: Array) -> None:
-    """Errors (6, 51) of attitude and velocity gained in a block of ``dt`` [s] per error of each coefficient; ``north``
-    and ``up`` are the earth rate in n."""
+def sources(
+    C: Array, sums: Array, dt: float, of_gyros: Array, of_accs: Array, north: float, up: float, out: Array
+) -> None:
+    """Errors (6, 51) of attitude and velocity gained in a block of ``dt`` [s] per error of each coefficient, with the
+    inverse gains (3, 3) of both triads; ``north`` and ``up`` are the earth rate in n."""
     out[:] = 0.0
     for a in range(3):
         for i in range(3):
             of_gyro = of_acc = 0.0
             for b in range(3):
-                of_gyro -= C[a, b] * c.gyro[b, i]
-                of_acc -= C[a, b] * c.accelerometer[b, i]
+                of_gyro -= C[a, b] * of_gyros[b, i]
+                of_acc -= C[a, b] * of_accs[b, i]
             out[a, i] = of_gyro * dt
             out[a, 37 + i] = of_gyro * abs(sums[i])
             out[3 + a, 12 + i] = of_acc * dt
@@ -321,13 +323,13 @@ def noise_added(F: Array, variances: Array, dt: float, Q: Array) -> None:
 
 @kernel
 def spread(F: Array, Q: Array, out: Array) -> None:
-    """``Q`` (m, m) becomes F Q F^T."""
-    product(F, Q, out)
+    """``Q`` (m, m), symmetric, becomes F Q F^T."""
     m = len(Q)
-    for i in range(m):
-        for j in range(i):
-            Q[i, j], Q[j, i] = Q[j, i], Q[i, j]
-    product(F, Q, out)
+    for _ in range(2):
+        product(F, Q, out)
+        for i in range(m):
+            for j in range(i):
+                Q[i, j], Q[j, i] = Q[j, i], Q[i, j]
 
 
 class State(NamedTuple):
@@ -365,7 +367,9 @@ def shoot(
     for node in range(len(first) - 1):
         q = (state.q[node, 0], state.q[node, 1], state.q[node, 2], state.q[node, 3])
         v = (state.v[node, 0], state.v[node, 1], state.v[node, 2])
-        drift, bias = applied(c.gyro, state.bias[node], 0), applied(c.accelerometer, state.bias[node], 3)
+        b = state.bias
+        drift = applied(c.gyro, (b[node, 0], b[node, 1], b[node, 2]))
+        bias = applied(c.accelerometer, (b[node, 3], b[node, 4], b[node, 5]))
         Phi, G, Q = shot.F[node], shot.G[node], shot.Q[node]
         Phi[:], G[:], Q[:] = 0.0, 0.0, 0.0
         for i in range(m):
@@ -379,7 +383,7 @@ def shoot(
                 q, v = carried(q, v, turn, gain, world)
             middle = normalize((before[0] + q[0], before[1] + q[1], before[2] + q[2], before[3] + q[3]))
             matrix(middle, C)
-            sources(C, sums, dt, c, world.earth[1], world.earth[2], S)
+            sources(C, sums, dt, c.gyro, c.accelerometer, world.earth[1], world.earth[2], S)
             transition(rotate(middle, (sums[6], sums[7], sums[8])), world.earth, dt, F)
             if m == 12:
                 for i in range(3):

@@ -41,15 +41,26 @@ class Candidate(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """A candidate, by how much chi-square falls when it is freed, whether that is more than chance, the ``shift`` (p,)
-    of the coefficients of the fit that goes with it, and its ``reach`` (p, q): what its parameters may still shift by,
-    as far as record and prior leave them open, each column by one standard deviation."""
+    """A candidate, by how much chi-square falls when it is freed, and whether that is more than chance; by how much
+    each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the coefficients of the fit; in the
+    same units the ``score`` (q,) of the parameters and their ``information`` (q, q), that of the prior with it."""
 
     candidate: Candidate
     drop: float
     significant: bool
-    shift: Array
-    reach: Array
+    moved: Array
+    score: Array
+    information: Array
+
+    @property
+    def shift(self) -> Array:
+        """Shift (p,) of the coefficients when the candidate is freed."""
+        return np.asarray(self.moved @ np.linalg.solve(self.information, self.score))
+
+    @property
+    def reach(self) -> Array:
+        """Shifts (p, q) that record and prior leave open, each column by one standard deviation of the parameters."""
+        return np.asarray(self.moved @ np.linalg.inv(np.linalg.cholesky(self.information)).T)
 
 
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
@@ -113,10 +124,8 @@ def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
         left = scaled[np.ix_(q, q)] - scaled[q, :p] @ by
         if not np.all(np.linalg.eigvalsh(left) > 0.0):  # lost in rounding
             continue
-        root = np.linalg.inv(np.linalg.cholesky(left))
-        found = root.T @ (root @ score)
-        drop = float(score @ found)
+        drop = float(score @ np.linalg.solve(left, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(tried)))
         moved = -fit.prior[:, None] * by
-        done.append(Tested(each, drop, drop > limit, moved @ found, moved @ root.T))
+        done.append(Tested(each, drop, drop > limit, moved, score, left))
     return sorted(done, key=lambda each: -each.drop)

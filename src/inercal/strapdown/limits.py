@@ -117,6 +117,16 @@ class Limits:
     far_from_prior: float = 4.0
     """Distance of a value from what is expected, over the standard deviation of its prior, at which that is doubted."""
 
+    usual_drift: float = 1.0 / 30.0
+    """Usual drift of gyros by one g, over the standard deviation of their biases: cheap ones have 3 deg/s and 0.1 deg/s
+    for each g, those of tactical grade 30 deg/h and 1 deg/h."""
+
+    sizes: int = 200
+    """Sizes of drifts by specific force that are averaged over."""
+
+    considered_part: float = 0.5
+    """Part of u that an effect which is not fitted must make to be told, over the u without it."""
+
     largest_part: float = 0.3
     """Part of the largest ratio of u to its goal in the criterion of a path, beside their geometric mean."""
 

@@ -23,6 +23,7 @@ from inercal.records.record import Record, recorded_temperature
 from inercal.strapdown.batch import Fit
 from inercal.strapdown.budget import sources
 from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
+from inercal.strapdown.considered import considered
 from inercal.strapdown.error_state import Filtered
 from inercal.strapdown.left_out import Tested, tests
 from inercal.strapdown.limits import LIMITS
@@ -88,7 +89,10 @@ def assemble(
     )
     if settings.time_base_u > 0.0:
         parts.append(TypeB("time base", settings.time_base_u, "1", scales))
-    uncertainty = combine(found, parts)
+    tested = tests(fit, settings)
+    fitted_u = combine(found, parts).u
+    drifts = considered(tested, settings, J, found, fitted_u)
+    uncertainty = combine(found, [*parts, drifts.source] if drifts else parts)
     left = dict(zip(found, (uncertainty.u / prior_u).tolist(), strict=True))
     judged = learned(J @ fit.covariance @ J.T, prior_u, found)
     at_prior = [name for name in found if left[name] > HALF_SEEN]
@@ -103,8 +107,8 @@ def assemble(
         )
         findings.append(Finding("stated_exact", text))
     findings += _too_quiet(fit)
-    tested = tests(fit, settings)
-    findings += _left_out(tested, found, J, uncertainty.u)
+    findings += _left_out(tested, found, J, fitted_u)
+    findings += [drifts.finding] if drifts and drifts.finding else []
     findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
     findings += _turn_noise(settings, left)
     at_rest, over_turns = residuals(fit)
@@ -142,6 +146,7 @@ def assemble(
                 "velocity": settings.noise.turn_velocity,
             },
             "walks": {"gyro": settings.noise.gyro_walk, "accelerometer": settings.noise.accelerometer_walk},
+            "drifts": {"usual": drifts.usual, "left": drifts.left} if drifts else None,
             "left_out": {
                 each.candidate.name: {"chi2_drop": each.drop, "parameters": len(each.candidate.prior)}
                 for each in tested

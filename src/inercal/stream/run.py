@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
 from types import FrameType
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ from inercal.records.write import number
 from inercal.stream.lines import Line, Lines, Sample
 
 S = TypeVar("S")
+T = TypeVar("T", contravariant=True)
 
 Output = Sequence[float | str]
 """Values of an output line; NaN is written as nothing, texts as they are."""
@@ -114,6 +115,19 @@ class Recursive(Protocol[S]):
         """The lines of rows that were held, where the stream ends with that state."""
 
 
+@runtime_checkable
+class Sufficient(Protocol[T]):
+    """An estimator that may know enough before its stream ends."""
+
+    def enough(self, state: T) -> str:
+        """Words for a state that needs no more rows; empty for others."""
+
+
+def _never(_: object) -> str:
+    """No state is enough."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Saving:
     """File of the saved state, and rows from one save to the next."""
@@ -152,7 +166,7 @@ def run(
     say: Callable[[str], None] = lambda _: None,
     after: float = -math.inf,
 ) -> int:
-    """Run an estimator to the end of a stream.
+    """Run an estimator to the end of a stream; one that is `Sufficient` until it knows enough, which is said.
 
     Parameters
     ----------
@@ -193,6 +207,7 @@ def _run(
     after: float,
 ) -> int:
     """As `run`, with the checkpoint to itself."""
+    enough = estimator.enough if isinstance(estimator, Sufficient) else _never
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
     whole = _Whole(_Position(), estimator.initial())
     if saving is not None and saving.path.exists():
@@ -211,6 +226,9 @@ def _run(
             write(",".join(each if isinstance(each, str) else number(each) for each in output))
 
     give([estimator.columns])
+    if words := enough(state):
+        say(words)
+        return position.rows
     with closing(lines), _interrupts() as interrupts:
         try:
             for line, sample in _new_samples(lines, position, interrupts, say):
@@ -221,6 +239,9 @@ def _run(
                 if line.whole:
                     position = position.after(line, sample.t)
                     keep(1 if saving is None else saving.every)
+                if words := enough(state):
+                    say(words)
+                    break
         except KeyboardInterrupt:
             if interrupts.waiting:
                 keep()

@@ -27,7 +27,7 @@ from inercal.selfcal.filters.run import load_kernels as load_filter
 from inercal.selfcal.filters.run import recursive
 from inercal.selfcal.filters.second_pass import Kept
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import KA1
+from inercal.selfcal.platform.coefficients import KA1, divisor
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.states import KIND_OF, TEMPERATURE
 from inercal.selfcal.result.columns import columns, rows
@@ -91,6 +91,8 @@ class Selfcal:
         Interval [s] of the lines, in the time of the record; 0 for a line each row.
     fixed : mapping
         Angle [rad] of the joints that are fixed and have no column, by name.
+    goal : mapping
+        Wanted standard uncertainty [SI] by name; where all are met a line is due, and `enough` says so.
     say : callable
         Told of gaps, of the first few; and once each when the innovations contradict the model, when the filter
         diverges, and when the gimbals lock.
@@ -112,6 +114,7 @@ class Selfcal:
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
         fixed: Mapping[str, float] = MappingProxyType({}),
+        goal: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
         self._module, self._problem, self._every, self._say = filter_of(problem), problem, every, say
         self._where, record = lines.where, lines.record
@@ -127,6 +130,7 @@ class Selfcal:
         self._places = [names.index(column.name) for column in channels]
         self._factors = [column.unit.factor for column in channels]
         self._fixed = [(k, fixed[name]) for k, name in enumerate(wanted) if name in fixed]
+        self._wanted = np.array([goal.get(name, math.inf) for name in problem.names])
         self._measured = sensor == "gyro"
         self._gained = np.array([column.increment for column in channels[:3]])
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
@@ -199,6 +203,21 @@ class Selfcal:
         if math.isfinite(nis):
             state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
         return self._line(self._alarmed(state, trace), estimate, nis)
+
+    def enough(self, state: SelfcalState) -> str:
+        """Words for a state in which all goals are met, and nothing contradicts the model; empty for others."""
+        if not state.begun or not np.isfinite(self._wanted).any():
+            return ""
+        estimate = estimate_of(state.filter, self._problem)
+        u = estimate.u[-1] / divisor(estimate.coefficients)[-1]
+        count = int(np.isfinite(self._wanted).sum())
+        return f"all {count} goals are met at t = {state.t:.10g} s" if self._met(state, u) else ""
+
+    def _met(self, state: SelfcalState, u: Array) -> bool:
+        """True where standard uncertainties (p,) are within the goals, if there are any, no alarm was given, and the
+        innovations have been judged."""
+        sound = state.rows >= _SETTLED and not state.alarms.given
+        return bool(sound and np.isfinite(self._wanted).any() and (u <= self._wanted).all())
 
     def finish(self, state: SelfcalState) -> Sequence[Output]:
         """Nothing."""
@@ -302,7 +321,9 @@ class Selfcal:
             self._problem.world,
         )
         state = state._replace(angles=row[:3].copy())
-        slots = state.slots.at(state.t, self._every)
+        slots = state.slots.at(state.t, self._every) or (
+            state.slots if self._met(state, row[11::2]) else None
+        )
         if slots is None:
             return state, ()
         mean = state.nis / state.rows if state.rows else math.nan

@@ -13,7 +13,8 @@ from pydantic_core import core_schema
 from inercal._toml import Strict
 from inercal.errors import StudyError
 from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.plan import JointName, Move, Plan, Rest, Turn, path
+from inercal.selfcal.platform.joint_limits import ANY, JointLimits, Region
+from inercal.selfcal.platform.plan import NO_LIMIT, JointName, Move, Plan, Rest, Turn, of_joints, path
 from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals
 from inercal.studies.fields import (
     AsTyped,
@@ -74,6 +75,15 @@ class GimbalLimitsTable(Strict):
     )
 
 
+_MOST_RATE = QuantityText("rate", "5 deg/s", positive, "a rate above zero")
+_MOST_ACCELERATION = QuantityText("rate ramp", "2 deg/s^2", positive, "an acceleration above zero")
+_OF_JOINTS = "the joints x, y, z"
+
+
+class ForbiddenTable(GimbalLimitsTable):
+    """Angles that the joints may not have together, whole turns aside; any angle of a joint that is absent."""
+
+
 class FixedJointsTable(Strict):
     """Joints that do not turn, of a rig of one or two axes; a record needs no column of their angles."""
 
@@ -107,6 +117,23 @@ class GimbalsTable(Strict):
     signs: Signs = Field(default=[1, 1, 1], description="of the angles: -1 where one counts left-handed")
     limits: GimbalLimitsTable = Field(
         default=GimbalLimitsTable(), title="Limits", description="ranges of the joints; none if absent"
+    )
+    joint_rate: Annotated[Several, SeveralTexts(_MOST_RATE, _OF_JOINTS, one=True)] | None = Field(
+        default=None,
+        description="largest rate of the joints, one for all or x, y, z; those of the plan if absent",
+        examples=[["5 deg/s", "2 deg/s", "5 deg/s"]],
+    )
+    joint_acceleration: Annotated[Several, SeveralTexts(_MOST_ACCELERATION, _OF_JOINTS, one=True)] | None = (
+        Field(
+            default=None,
+            description="by which turns begin and end, one for all or x, y, z; at once if absent",
+            examples=[["2 deg/s^2", "1 deg/s^2", "2 deg/s^2"]],
+        )
+    )
+    forbidden: list[ForbiddenTable] | None = Field(
+        default=None,
+        description="regions that no path of the rig may touch, such as where something is in the way",
+        examples=[[{"x": ["80 deg", "100 deg"], "y": ["20 deg", "60 deg"]}]],
     )
     fixed: FixedJointsTable = Field(
         default=FixedJointsTable(),
@@ -157,18 +184,40 @@ def limits_of(table: GimbalsTable, where: object) -> dict[str, tuple[float, floa
 
     Raises `StudyError` for ends out of order.
     """
+    return _ranges(table.limits, "rig.limits", where)
+
+
+def _ranges(table: GimbalLimitsTable, key: str, where: object) -> dict[str, tuple[float, float]]:
+    """Ranges (low, high) [rad] of the joints that have one, by name of the angle."""
     limits: dict[str, tuple[float, float]] = {}
-    for name, joint in zip(JOINTS, GimbalLimitsTable.model_fields, strict=True):
-        ends: Several | None = getattr(table.limits, joint)
+    for name in JOINTS:
+        ends: Several | None = getattr(table, name[-1])
         if ends is None:
             continue
         low, high = ends.values
         if not low < high:
             raise StudyError(
-                where, f"rig.limits.{joint}: found {shown(ends.typed)}, expected the lower end first"
+                where, f"{key}.{name[-1]}: found {shown(ends.typed)}, expected the lower end first"
             )
         limits[name] = (low, high)
     return limits
+
+
+def joints_of(table: GimbalsTable, where: object) -> JointLimits:
+    """Rates, accelerations and forbidden regions; raises `StudyError` for a region without angles, or with ends out of
+    order."""
+    rate, acceleration = (
+        NO_LIMIT if several is None else of_joints(several.values)
+        for several in (table.joint_rate, table.joint_acceleration)
+    )
+    regions = []
+    for k, region in enumerate(table.forbidden or ()):
+        ranges = _ranges(region, f"rig.forbidden[{k + 1}]", where)
+        if not ranges:
+            raise StudyError(where, f"rig.forbidden[{k + 1}]: found no angles, expected those of a joint")
+        x, y, z = (ranges.get(name, ANY) for name in JOINTS)
+        regions.append(Region((x, y, z)))
+    return JointLimits(rate, acceleration, tuple(regions))
 
 
 def fixed_of(table: GimbalsTable, where: object) -> dict[str, float]:
@@ -251,8 +300,8 @@ class PlanTable(Strict):
     )
 
 
-def plan_of(table: PlanTable, fixed: Mapping[str, float], where: object) -> Plan:
-    """The plan; those of ``fixed`` joints [rad] as they are.
+def plan_of(table: PlanTable, fixed: Mapping[str, float], joints: JointLimits, where: object) -> Plan:
+    """The plan, as its ``joints`` can; those that are ``fixed`` [rad] as they are.
 
     Raises `StudyError` for neither or both of turns and path, too few or too many rows, or a turn of a fixed joint.
     """
@@ -271,7 +320,7 @@ def plan_of(table: PlanTable, fixed: Mapping[str, float], where: object) -> Plan
     if table.start is not None:
         x, y, z = table.start.values
         plan = replace(plan, start=(x, y, z))
-    plan = _with_fixed(plan, fixed, table.start is not None, where)
+    plan = joints.kept(_with_fixed(plan, fixed, table.start is not None, where))
     rows = plan.duration / plan.step
     if not FEWEST <= rows <= LIMITS.most_rows:
         raise StudyError(

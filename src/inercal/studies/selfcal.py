@@ -53,10 +53,11 @@ from inercal.studies.platform import (
     base_of,
     fixed_of,
     gimbals_of,
+    joints_of,
     limits_of,
     plan_of,
 )
-from inercal.studies.platform_model import ModelTable, model_of, on_rig, true_errors
+from inercal.studies.platform_model import LEFT_OUT, ModelTable, model_of, on_rig, true_errors
 from inercal.studies.rig import Angle
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, parse_quantity
@@ -131,6 +132,17 @@ class FilterTable(table_of(Filter)):  # type: ignore[misc]
     )
 
 
+class SearchTable(table_of(Search)):  # type: ignore[misc]
+    """The search for a path."""
+
+    robust: list[Literal[LEFT_OUT]] = Field(  # type: ignore[valid-type]
+        default=[],
+        description="errors that are no states, of the size stated under model, or usual: how far they shift "
+        "coefficients counts beside the bound",
+        examples=[["k2", "harmonics"]],
+    )
+
+
 class HarmonicTable(Strict):
     """An error of an encoder that repeats with its angle: amplitude times sin(order times angle + phase)."""
 
@@ -200,7 +212,7 @@ class SelfcalStudyFile(Strict):
     disturbances: DisturbancesTable = Field(
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
-    design: Stated[Search] = Field(default=Search(), title="Design", description="the search for a path")
+    design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
     item: Item = ItemTable()
     laboratory: Laboratory = LaboratoryTable()
     equipment: Equipment
@@ -216,6 +228,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     """
     file = check(SelfcalStudyFile, data, path, StudyError)
     base, limits, fixed = base_of(file.rig), limits_of(file.rig, path), fixed_of(file.rig, path)
+    joints = joints_of(file.rig, path)
     return SelfcalSettings(
         site=_site(file.site, path),
         noise=file.noise,
@@ -224,14 +237,15 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         base=base,
         heading_unknown=file.rig.heading == "unknown",
         limits=limits,
+        joints=joints,
         fixed=fixed,
-        plan=None if file.plan is None else plan_of(file.plan, fixed, path),
+        plan=None if file.plan is None else plan_of(file.plan, fixed, joints, path),
         truth=None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances)),
         goal=_wanted(file.goal),
         filter=_filter(file.filter),
         model=model_of(file.model, file.filter, path),
         disturbances=_disturbances(file.disturbances),
-        search=file.design,
+        search=settings_of(Search, file.design, robust=tuple(file.design.robust)),
         placed=tuple(_placed(each, file) for each in file.records),
         traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,

@@ -18,8 +18,8 @@ from typing import Any, cast
 from inercal import __version__
 from inercal._jit import source_hash
 from inercal.estimate.basis import Basis
+from inercal.estimate.executors import Executor, Processes, Serial
 from inercal.estimate.result import Estimate, timed
-from inercal.estimate.runs import Executor, Processes, Serial
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
 from inercal.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge

@@ -6,20 +6,25 @@ import os
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal._files import write_text
+import numpy as np
+
+from inercal._files import read_bytes, write_text
 from inercal.errors import InercalError, InputError
 from inercal.workbench.jobs import Job, Queue
-from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions
+from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions, put
 
 if TYPE_CHECKING:
+    from inercal.designs.foresight import Course as Planned
+    from inercal.designs.foresight import Foresight
     from inercal.face.result import Result
+    from inercal.face.study import Study
     from inercal.records.record import Record
-    from inercal.workbench.charts import Course
+    from inercal.workbench.charts import Course, Notes
 
 _HELD = 2
 """Recordings that are held in memory."""
@@ -27,10 +32,11 @@ _HELD = 2
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A recording that was read: the record, and its channels as they are drawn."""
+    """A recording that was read: the record, its channels as they are drawn, and the notes on them."""
 
     record: Record
     courses: tuple[Course, ...]
+    notes: Notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +52,9 @@ class Bench:
 
     def look(self, session: Session) -> Looked:
         """Read the recordings of a session; raises `InputError`. The last few are held."""
+        from inercal.records.quiet import quiet
         from inercal.records.read import read
-        from inercal.workbench.charts import courses
+        from inercal.workbench.charts import Notes, courses, marks_of
 
         files = [*session.recordings, *filter(None, [session.map])]
         if not session.recordings:
@@ -58,7 +65,8 @@ class Bench:
                 while len(self._looked) >= _HELD:
                     self._looked.popitem(last=False)
                 record = read(session.recordings, session.map)
-                self._looked[key] = Looked(record, courses(record))
+                notes = Notes(marks_of(record), quiet(record))
+                self._looked[key] = Looked(record, courses(record), notes)
             self._looked.move_to_end(key)
             return self._looked[key]
 
@@ -93,6 +101,36 @@ class Bench:
         words = session.command(Path("{out}/result.json"), Path("{out}/report.html"))
         return self.queue.add(session.id, session.folder, words)
 
+    def plan(self, kind: str) -> Session:
+        """A new session with a study of that kind to plan a test with, without a recording; raises `InputError`."""
+        session = self.sessions.begin(f"plan of a test: {KINDS.get(kind, kind)}")
+        return self.begin_study(session, kind)
+
+    def foreseen(self, session: Session) -> tuple[Study, Foresight, Planned]:
+        """The study of a session, what its plan makes expect, and its course; raises `InputError`."""
+        from inercal.face.foresight import course, foresight
+        from inercal.face.study import read_study
+
+        if session.study is None:
+            raise InputError(session.title, "found no study, expected one")
+        study = read_study(session.kind, session.study)
+        seen = foresight(study)
+        seen.u(np.ones(len(seen.levers)))  # loads what it is computed with
+        return study, seen, course(study)
+
+    def design(self, session: Session, settings: Sequence[str] = ()) -> Job:
+        """Put the search for a better plan into the queue, with ``settings`` as of ``--set``; raises `InputError`."""
+        from inercal.workbench.plans import KINDS as PLANNED
+
+        if session.kind not in PLANNED or session.study is None:
+            raise InputError(
+                session.title, f"found no study that plans a test, expected one of {', '.join(PLANNED)}"
+            )
+        kind = PLANNED[session.kind]
+        words = [*kind.command, STUDY, *(word for each in settings for word in ("--set", each))]
+        out = ["--out", f"{{out}}/plan{kind.ending}", "--report", "{out}/report.html"]
+        return self.queue.add(session.id, session.folder, [*words, *out])
+
     def result(self, job: Job) -> Result:
         """The result of a job; raises `InputError` where there is none."""
         from inercal.face.calibrations import load
@@ -100,6 +138,15 @@ class Bench:
         if job.result is None:
             raise InputError(f"job {job.id}", f"has no result, it is {job.state.value}")
         return load(job.result)
+
+    def change(self, session: Session, path: str, value: str) -> None:
+        """Set a key of the study of a session; raises `InputError` where that cannot be."""
+        from inercal.workbench.form import changed
+
+        if session.study is None:
+            raise InputError(session.title, "found no study, expected one")
+        text = read_bytes(session.study).decode(errors="replace")
+        put(session, STUDY, changed(text, path, value))
 
     def keep(self, job: Job, instrument: str = "") -> Job:
         """Put into the queue that the result of a job, with its report, is kept in the store."""
@@ -139,6 +186,17 @@ class Bench:
         words += ["--store", self.store] if self.store else []
         return self.queue.add(job.session, job.where, words)
 
+    def convert(self, job: Job, tool: str) -> Job:
+        """Put into the queue that the result of a job is written as another tool reads it; raises `InputError`."""
+        from inercal.convert.other_tools import CONVENTIONS
+
+        if tool not in CONVENTIONS:
+            raise InputError("tool", f"found {tool!r}, expected one of {', '.join(CONVENTIONS)}")
+        out = f"{{out}}/{tool}{CONVENTIONS[tool].suffixes[0]}"
+        return self.queue.add(
+            job.session, job.where, ["convert", self._result_of(job), "--to", tool, "--out", out]
+        )
+
     def compare(self, before: Job, after: Job) -> Job:
         """Put into the queue that two results of one instrument are compared."""
         words = [
@@ -158,6 +216,10 @@ class Bench:
     def last_job(self, session: Session) -> Job | None:
         """The newest calibration of a session, None without any."""
         return next((job for job in self.queue if job.session == session.id and job.calibrates), None)
+
+    def last_design(self, session: Session) -> Job | None:
+        """The newest search for a plan of a session, None without any."""
+        return next((job for job in self.queue if job.session == session.id and job.designs), None)
 
     def close(self) -> None:
         """End the running job."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,13 +15,20 @@ from inercal.arrays import Array
 from inercal.records.channels import sensor_and_axis
 from inercal.records.column import counted_rows
 from inercal.records.record import Record
-from inercal.report.style import COLOURS, plain_unit
+from inercal.report.style import ALARM, COLOURS, plain_unit
 
 PIECES = 1200
 """Pieces of a line, each shown by its least and greatest value: some of the pixels across a screen."""
 
 BLOCK = 512
 """Samples whose least and greatest value is kept, so that a long recording is not gone through again."""
+
+
+_REST, _TURN = "rgba(68,170,153,0.16)", "rgba(238,136,102,0.10)"
+"""Shades of rests and of turns."""
+
+_MARKED, _SHADED = 60, 300
+"""Most marks, and most rests, that are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +111,35 @@ def _alternating(low: Array, high: Array) -> Array:
     return np.column_stack([low, high]).ravel()
 
 
+@dataclass(frozen=True)
+class Notes:
+    """Notes on a recording over time: ``marks`` at times [s] with their words, and ``rests`` (begin, end) [s]."""
+
+    marks: Mapping[float, str] = field(default_factory=dict)
+    rests: Sequence[tuple[float, float]] = ()
+
+
+def marks_of(record: Record) -> dict[float, str]:
+    """Times [s] at which a finding about a record says it lies, with its code; the first of those at one time."""
+    t = next(iter(record.columns.values())).t if record.columns else np.zeros(0)
+    marks: dict[float, str] = {}
+    for finding in record.findings:
+        times = [float(each) for each in re.findall(r"(-?\d[\d.e+-]*) s\b", finding.where)]
+        rows = re.fullmatch(r"rows? (.+?)(?: and \d+ more)?", finding.where)
+        if rows and len(t):
+            numbers = [
+                int(each.split("-")[0]) for each in rows[1].split(", ") if each.split("-")[0].isdigit()
+            ]
+            times += [float(t[min(max(number - 1, 0), len(t) - 1)]) for number in numbers]
+        for time in times:
+            marks.setdefault(time, finding.code)
+    return marks
+
+
 def figure(
-    shown: Sequence[Course], span: tuple[float, float] | None = None, marks: Mapping[float, str] | None = None
+    shown: Sequence[Course], span: tuple[float, float] | None = None, notes: Notes | None = None
 ) -> dict[str, Any]:
-    """A figure of plotly with a panel for each sensor, one time axis, and ``marks`` at times with their words."""
+    """A figure of plotly with a panel for each sensor, one time axis with one cursor, and ``notes`` at their times."""
     sensors = list(dict.fromkeys(course.sensor for course in shown))
     begin, end = span or (None, None)
     data = []
@@ -126,7 +160,7 @@ def figure(
                 "hovertemplate": f"%{{y:.6g}} {course.unit}",
             }
         )
-    return {"data": data, "layout": _layout(shown, sensors, span, marks or {}), "config": _CONFIG}
+    return {"data": data, "layout": _layout(shown, sensors, span, notes or Notes()), "config": _CONFIG}
 
 
 _CONFIG = {
@@ -137,11 +171,34 @@ _CONFIG = {
 }
 
 
+def _bands(rests: Sequence[tuple[float, float]], span: tuple[float, float] | None) -> list[dict[str, Any]]:
+    """Shades behind rests, and of another colour behind the turns between them."""
+    begin, end = span or (-np.inf, np.inf)
+    inside = [(a, b) for a, b in rests if b >= begin and a <= end]
+    inside = inside if len(inside) <= _SHADED else []
+    turns = [(a[1], b[0]) for a, b in pairwise(inside)]
+    return [
+        {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "layer": "below",
+         "line": {"width": 0}, "fillcolor": colour}
+        for colour, of in ((_REST, inside), (_TURN, turns))
+        for a, b in of
+    ]  # fmt: skip
+
+
+def _lines(marks: Mapping[float, str]) -> list[dict[str, Any]]:
+    """Lines at the times of marks."""
+    return [
+        {"type": "line", "xref": "x", "yref": "paper", "x0": t, "x1": t, "y0": 0, "y1": 1,
+         "line": {"color": ALARM, "width": 1, "dash": "dot"}}
+        for t in [*marks][:_MARKED]
+    ]  # fmt: skip
+
+
 def _layout(
     shown: Sequence[Course],
     sensors: Sequence[str],
     span: tuple[float, float] | None,
-    marks: Mapping[float, str],
+    notes: Notes,
 ) -> dict[str, Any]:
     """Panels one above the other, the time below, cursors on all of them."""
     timed = all(course.rising for course in shown)
@@ -149,6 +206,7 @@ def _layout(
     if len(sensors) < 2:
         x["anchor"] = "y"
     x |= {"showspikes": True, "spikemode": "across", "spikethickness": 1, "spikesnap": "cursor"}
+    x["gridcolor"] = "rgba(128,128,128,0.25)"
     if span is not None:
         x |= {"range": list(span), "autorange": False}
     layout: dict[str, Any] = {
@@ -156,16 +214,18 @@ def _layout(
         "hovermode": "x unified",
         "dragmode": "zoom",
         "uirevision": "kept",
-        "margin": {"l": 70, "r": 15, "t": 10, "b": 45},
-        "height": max(150 * len(sensors) + 60, 260),
+        "margin": {"l": 70, "r": 15, "t": 34, "b": 45},
+        "height": max(150 * len(sensors) + 84, 284),
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": "#7A858F"},
-        "legend": {"orientation": "h", "y": 1.04},
-        "shapes": [
-            {"type": "line", "xref": "x", "yref": "paper", "x0": t, "x1": t, "y0": 0, "y1": 1,
-             "line": {"color": "#C03A2B", "width": 1, "dash": "dot"}}
-            for t in marks
+        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
+        "hoversubplots": "axis",
+        "shapes": [*_bands(notes.rests, span), *_lines(notes.marks)],
+        "annotations": [
+            {"xref": "x", "yref": "paper", "x": t, "y": 1.0, "text": words, "showarrow": False, "textangle": -90,
+             "xanchor": "right", "yanchor": "top", "font": {"color": ALARM, "size": 10}}
+            for t, words in [*notes.marks.items()][:_MARKED]
         ],
     }  # fmt: skip
     height = 1.0 / max(len(sensors), 1)

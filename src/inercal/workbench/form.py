@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -207,6 +208,12 @@ def _edits(lines: list[str], path: str, value: str, wanted: Mapping[str, Any]) -
             yield edited
     if value:
         yield _at_end(lines, ".".join(names[:-1]), names[-1], value)
+    elif (span := _span(lines, path)) is not None:  # a whole table, with its head
+        begin, end = span[0] - 1, span[1]
+        gone = [
+            f"# {line}" if line.strip() and not line.startswith("#") else line for line in lines[begin:end]
+        ]
+        yield [*lines[:begin], *gone, *lines[end:]]
 
 
 def _in_place(lines: list[str], table: str, name: str, value: str) -> list[str] | None:
@@ -220,11 +227,24 @@ def _in_place(lines: list[str], table: str, name: str, value: str) -> list[str] 
     if not found:
         return None
     k, match = found[0]
+    end = k + 1 if match[2] else _end(lines, k, match[3])
     if not value:
-        return [*lines[:k], f"# {lines[k]}", *lines[k + 1 :]]
+        return [*lines[:k], *(f"# {line}" for line in lines[k:end]), *lines[end:]]
     head = f"{name} = {value}"
-    remark = _remark(match[3])
-    return [*_in_force(lines[:k], table), f"{head:35s} {remark}".rstrip(), *lines[k + 1 :]]
+    remark = "" if "\n" in value else _remark(match[3])
+    return [*_in_force(lines[:k], table), f"{head:35s} {remark}".rstrip(), *lines[end:]]
+
+
+def _end(lines: list[str], k: int, begun: str) -> int:
+    """The line after the value that begins on line ``k``: a list may go over several."""
+    whole = begun
+    for end in range(k + 1, len(lines) + 1):
+        if end == k + 1 or "]" in lines[end - 1]:
+            with suppress(tomllib.TOMLDecodeError):
+                tomllib.loads(f"value = {whole}")
+                return end
+        whole += "\n" + lines[min(end, len(lines) - 1)]
+    return k + 1
 
 
 def _at_end(lines: list[str], table: str, name: str, value: str) -> list[str]:

@@ -69,6 +69,11 @@ class Job:
         return self.arguments[0] in ("calibrate", "selfcal", "aoa")
 
     @property
+    def designs(self) -> bool:
+        """True for a search for a plan."""
+        return self.arguments[0] == "design"
+
+    @property
     def result(self) -> Path | None:
         """The file of its result, None before there is one."""
         return path if (path := self.folder / "result.json").is_file() else None

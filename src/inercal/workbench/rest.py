@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import Body, FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from pydantic import BaseModel
 
@@ -50,6 +51,7 @@ def rest_of(bench: Bench) -> FastAPI:
     )
 
     app.add_exception_handler(InercalError, _refused)
+    app.add_exception_handler(RequestValidationError, _misshapen)
 
     @app.get("/sessions")
     def sessions() -> list[dict[str, Any]]:
@@ -133,6 +135,16 @@ def rest_of(bench: Bench) -> FastAPI:
         """Keep the result of a job in the store: "maker, model, serial" where its study does not say."""
         return _of_job(bench.keep(bench.queue.get(number), instrument))
 
+    @app.post("/jobs/{number}/convert", status_code=202)
+    def convert(number: str, tool: Annotated[str, Body(embed=True)]) -> dict[str, Any]:
+        """Write the result of a job as another tool reads it: imu_tk, imucal, kalibr or psins."""
+        return _of_job(bench.convert(bench.queue.get(number), tool))
+
+    @app.post("/sessions/{number}/design", status_code=202)
+    def design(number: str, settings: Annotated[list[str], Body(embed=True)] = []) -> dict[str, Any]:  # noqa: B006
+        """Search for a better plan of the test that the study of a session plans; settings as of --set."""
+        return _of_job(bench.design(bench.sessions.get(number), settings))
+
     @app.post("/jobs/{number}/certificate", status_code=202)
     def certify(number: str, certified: Certified) -> dict[str, Any]:
         """Write a certificate of the result of a job, with what the laboratory states."""
@@ -150,6 +162,14 @@ def rest_of(bench: Bench) -> FastAPI:
 def _refused(request: Request, error: Exception) -> JSONResponse:
     """The sentence of a refusal."""
     return JSONResponse({"error": str(error)}, 422)
+
+
+def _misshapen(request: Request, error: Exception) -> JSONResponse:
+    """The sentence for a body that is not as described; it may hold bytes that are no text."""
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    where = ".".join(str(each) for each in first["loc"][:6])
+    return JSONResponse({"error": f"{where}: {first['msg']}, expected it as /api/v1/openapi.json says"}, 422)
 
 
 def _of_session(session: Session) -> dict[str, Any]:

@@ -141,33 +141,40 @@ def _density(
 
 
 def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings) -> AoaSettings:
-    """The study with less flexure in each direction in which the fusion finds a tenth of the usual at most, in all
-    stretches, and the ``stated`` prior is the usual one: what is allowed for and is not there costs u, most at rest."""
+    """The study with less flexure in each direction in which the fusion finds a tenth of what is allowed at most, in
+    all stretches, and again with what is allowed then, where the ``stated`` prior is the usual one: what is allowed for
+    and is not there costs u, most at rest.
+
+    The first time this asks that angular acceleration makes no more of unknown positions than the usual flexure, the
+    second time a tenth of that: the filter needs room for its errors of second order, or its u is too small.
+    """
     usual, prior = Prior(), settings.prior
     if not _usual_flexure(stated) or settings.estimator.states < 15:
         return settings
-    found = np.max([_flexure(part, settings) for part in stretches], axis=0)
-    calm = [
-        each == before and rms < LIMITS.calm_share * each.level
-        for each, before, rms in zip(
-            (prior.heave, prior.axial), (usual.heave, usual.axial), found.tolist(), strict=True
-        )
-    ]
-    heave, axial = (
-        replace(each, level=LIMITS.calm_level * each.level) if less else each
-        for each, less in zip((prior.heave, prior.axial), calm, strict=True)
-    )
+    z, x, acceleration = np.max([_flexure(part, settings) for part in stretches], axis=0).tolist()
+    moved = math.hypot(prior.lever_common, prior.lever) * acceleration
+
+    def calm(each: Resonance, before: Resonance, rms: float) -> Resonance:
+        largest = before.level
+        for _ in range(LIMITS.calm_steps if each == before else 0):
+            if moved < largest and rms < LIMITS.calm_share * each.level:
+                each = replace(each, level=LIMITS.calm_level * each.level)
+            largest *= LIMITS.calm_share
+        return each
+
+    heave, axial = calm(prior.heave, usual.heave, z), calm(prior.axial, usual.axial, x)
     return replace(settings, prior=replace(prior, heave=heave, axial=axial))
 
 
 def _flexure(part: Recording, settings: AoaSettings) -> Array:
-    """Rms (2,) [m/s^2] of the flexure along z and x that the fusion of a stretch finds; infinite where none runs."""
+    """Rms (3,) that the fusion of a stretch finds of the flexure along z and x [m/s^2] and of the angular acceleration
+    [rad/s^2]; infinite where none runs."""
     part, of = limiting.fused(part, problem(settings, part.spatial))
     kept, at = np.full((len(part.t), 2 * of.size), np.nan), of.places.resonators
     advance(initial(of), of, part.t, part.rows, kept, last=True)
-    found = kept[part.t - part.t[:1] >= LIMITS.settling_time][:, [at + 1, at + 3]]
+    found = kept[part.t - part.t[:1] >= LIMITS.settling_time][:, [at + 1, at + 3, 2]]
     found = found[np.isfinite(found).all(axis=1)]
-    return np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else np.full(2, np.inf)
+    return np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else np.full(3, np.inf)
 
 
 def _usual_flexure(prior: Prior) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from inercal.errors import InputError
 from inercal.laboratory.certificate.elements import dcc, number, of_result, words
-from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
+from inercal.laboratory.specification import Conformity, Specification
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -15,26 +15,13 @@ if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
 
 
-def judged(estimate: Estimate, specification: Specification) -> dict[str, Conformity]:
-    """Conformity of each coefficient that has limits."""
-    shown = estimate.shown_units()
-    found = {}
-    for p in estimate.parameters.values():
-        limits = specification.of(p.name, p.unit, shown[p.name])
-        if limits is not None:
-            found[p.name] = conformity(specification, limits, p.value, p.u, p.U, p.dof)
-    return found
-
-
 def limits_used(specification: Specification, estimates: Sequence[Estimate], where: object) -> None:
     """Refuse limits of a coefficient that no result has."""
     names = {name for estimate in estimates for name in estimate.names}
-    for key in specification.limits:
-        if key not in names and key not in {group_of(name) for name in names}:
-            raise InputError(
-                where,
-                f"specification.{key}: found limits of what no result has, expected one of {_some(names)}",
-            )
+    for key in specification.without_value(names):
+        raise InputError(
+            where, f"specification.{key}: found limits of what no result has, expected one of {_some(names)}"
+        )
 
 
 def _some(names: set[str]) -> str:

@@ -11,12 +11,12 @@ from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 from inercal.laboratory.certificate.administration import administrative
-from inercal.laboratory.certificate.conformity import judged, limits_used, statement
+from inercal.laboratory.certificate.conformity import limits_used, statement
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES, XSI, plain
 from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
 from inercal.laboratory.certificate.results import measured
 from inercal.laboratory.certificate.schema import VERSION, fault
-from inercal.laboratory.specification import Conformity, Specification, specification_of
+from inercal.laboratory.specification import Conformity, Specification, judged, specification_of
 
 
 def certificate(

@@ -107,6 +107,10 @@ def transposed(contents: Contents, path: Path) -> Contents:
     return replace(contents, arrays=arrays)
 
 
+def _nothing(_: Path) -> None:
+    """Import nothing: a function with a name, which a child that is no fork can be handed."""
+
+
 @dataclass(frozen=True)
 class ArrayFormat:
     """A format whose files hold named arrays: ``opened`` lends those of a file while it is open, in a child process.
@@ -118,7 +122,7 @@ class ArrayFormat:
 
     name: str
     opened: Callable[[Path], AbstractContextManager[Contents]]
-    imported: Callable[[Path], object] = lambda _: None
+    imported: Callable[[Path], object] = _nothing
 
     def read(
         self,

@@ -117,16 +117,26 @@ def bounds(
     ``warm`` (n,) [K] above the temperature of the coefficients, 0 if absent.
     """
     c = problem.mean if truth is None else to_linear(truth[problem.states.index])
-    world, n, rate = problem.world, len(motion.t), motion.rate
-    q, dt = np.empty((n, 4)), np.diff(motion.t)
-    first = np.array(attitude(motion.angles[0], world.axes, world.signs))
-    without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
-    full = problem.states.full(c)
+    n, rate, dt = len(motion.t), motion.rate, np.diff(motion.t)
+    q = nominal_attitudes(motion, problem, c, warm)
     above = np.zeros(n) if warm is None else warm
-    truth_of = Truth(q, unused, motion.angles.copy())
-    simulate_truth(first, rate[:, None], dt[0], without, above, full, world, truth_of)
     seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
     return _along(Path(q, motion.angles, dt, rate, seen, above), c, problem, history, contributions)
+
+
+def nominal_attitudes(motion: CommandedMotion, problem: FilterProblem, c: Array, warm: Array | None) -> Array:
+    """Attitudes q_bp (n, 4) along a commanded motion with coefficients ``c`` (p,), linear form; ``warm`` as of
+    `bounds`."""
+    world, n, rate = problem.world, len(motion.t), motion.rate
+    q = np.empty((n, 4))
+    first = np.array(attitude(motion.angles[0], world.axes, world.signs))
+    without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
+    above = np.zeros(n) if warm is None else warm
+    truth_of = Truth(q, unused, motion.angles.copy())
+    simulate_truth(
+        first, rate[:, None], np.diff(motion.t)[0], without, above, problem.states.full(c), world, truth_of
+    )
+    return q
 
 
 def recorded_bounds(

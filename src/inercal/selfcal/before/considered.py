@@ -75,6 +75,13 @@ def sensitivities(
     )[3:]
 
 
+def load_kernels(problem: FilterProblem) -> None:
+    """Load, or compile, the kernels of `sensitivities`."""
+    still = np.zeros((2, 3))
+    recording = Recording(np.array([0.0, 1.0]), still[1:], still, np.full((2, 3), np.nan))
+    sensitivities(recording, problem, np.eye(4)[[0, 0]], np.zeros(len(problem.prior)), ())
+
+
 def innovation_slopes(
     recording: Recording,
     problem: FilterProblem,

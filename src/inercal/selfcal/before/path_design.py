@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.arrays import short_repr
+from inercal.arrays import Array, short_repr
+from inercal.estimate.executors import Executor
 from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
+from inercal.selfcal.before.left_out import left_out, shifts
 from inercal.selfcal.before.observability import Observability, observability
 from inercal.selfcal.before.path_search import criterion, search
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.joint_limits import beyond
 from inercal.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
-from inercal.selfcal.settings import SelfcalSettings
+from inercal.selfcal.settings import Search, SelfcalSettings
 from inercal.selfcal.still_joints import without_fixed
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -29,13 +32,33 @@ REFERENCES = (BAYESIAN_BOUNDS,)
 
 @dataclass(frozen=True, eq=False)
 class ComparedPath:
-    """A plan judged by its bounds and its ``criterion``, and the joints it takes ``beyond`` their limits."""
+    """A plan judged by its bounds and its ``criterion``, what it takes ``beyond`` limits, and how far each error that
+    is ``left_out``, as large as stated or usual, shifts the coefficients (p,)."""
 
     name: str
     plan: Plan
     observability: Observability
     criterion: float
     beyond: tuple[str, ...]
+    left_out: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def shifted(self) -> Array:
+        """(p,) shift of the coefficients by the errors left out, all together."""
+        return np.sqrt(
+            sum(
+                (np.square(each) for each in self.left_out.values()),
+                np.zeros(len(self.observability.bounds.u)),
+            )
+        )
+
+    def worst_shift(self) -> str:
+        """The largest shift over u by errors left out, in words."""
+        bounds = self.observability.bounds
+        ratio = self.shifted / bounds.u
+        k = int(np.argmax(ratio))
+        by = max(self.left_out, key=lambda name: abs(float(self.left_out[name][k])))
+        return f"{ratio[k]:.3g} u of {bounds.names[k]}, most by {by}"
 
 
 @short_repr
@@ -79,27 +102,33 @@ class Designed:
             worst = f"{100 * learned.ratio[k]:.3g} % {learned.names[k]}"
             remark = ", ".join(each.observability.at_prior) or "none"
             beyond = f"; beyond the limits of {', '.join(each.beyond)}" if each.beyond else ""
+            if each.left_out:
+                beyond += f"; errors left out: {each.worst_shift()}"
             figures = f"{each.plan.duration:8.6g}  {each.criterion:9.3g}  {worst:>23}"
             lines.append(f"{each.name:<{wide}}  {figures}  {remark}{beyond}")
         return "\n".join(["   #  move", *moves, "", first.observability.table(), "", *lines])
 
 
 def design(
-    settings: SelfcalSettings, progress: Callable[[int, int], None] = lambda done, total: None
+    settings: SelfcalSettings,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    executor: Executor | None = None,
 ) -> Designed:
     """Search for a path within rate, time and limits of the study, and set it beside others.
 
-    Bounds are those of the nominal path: the prior of the coefficients is enough. ``progress`` is told (done, total).
+    Bounds are those of the nominal path: the prior of the coefficients is enough. ``progress`` is told (done, total)
+    of the starts, which the ``executor`` computes.
+
     Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
     settings = without_fixed(settings)[0]
-    best = search(settings, progress)
+    best = search(settings, progress, executor)
     asked = settings.search
     plans = {"found": best}
     if settings.plan is not None:
         plans["study"] = lasting(settings.plan, best.duration)
     for name in PATHS:
-        other = replace(path(name, best.step), rate=best.rate, start=best.start)
+        other = settings.joints.kept(replace(path(name, best.step), rate=best.rate, start=best.start))
         left = best.duration - other.duration
         if any(isinstance(move, Turn) and f"th_{move.joint}" in settings.fixed for move in other.moves):
             continue
@@ -115,7 +144,7 @@ def design(
     return Designed(
         judged,
         f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {best.duration:g} s, by the "
-        f"{by} over {'goal or prior' if settings.goal else 'prior'}: {best.words()}",
+        f"{by} over {'goal or prior' if settings.goal else 'prior'}{_counted(asked)}: {best.words()}",
         (*judged[0].observability.findings(), *near),
     )
 
@@ -168,10 +197,23 @@ def _compared(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
     temperature = settings.simulated_temperature(len(commanded.t))
     warm = None if temperature is None else settings.warm(temperature)
     along = bounds(commanded, problem(settings), warm=warm)
-    value = criterion(along, settings.goal, settings.search.criterion)
+    of = left_out(settings)
+    moved = shifts(commanded, problem(settings), of, warm)
+    value = criterion(along, settings.goal, settings.search.criterion, np.square(moved).sum(axis=1))
+    by_error = dict(zip(of.names, moved.T, strict=True))
     return ComparedPath(
-        name, plan, observability(along, settings.goal), value, tuple(plan.beyond(settings.limits))
+        name,
+        plan,
+        observability(along, settings.goal),
+        value,
+        tuple(beyond(plan, settings.limits, settings.joints)),
+        by_error,
     )
+
+
+def _counted(asked: Search) -> str:
+    """Errors that count beside the bound, in words."""
+    return f", with what {', '.join(asked.robust)} left out do to it" if asked.robust else ""
 
 
 def _log_volume(judged: ComparedPath) -> float:
@@ -196,4 +238,7 @@ def _entry(judged: ComparedPath, least: float) -> dict[str, Any]:
         "at_prior": list(judged.observability.at_prior),
         "worst_combinations": judged.observability.worst(),
         "beyond": list(judged.beyond),
+        "left_out": dict(zip(judged.observability.bounds.names, judged.shifted.tolist(), strict=True))
+        if judged.left_out
+        else {},
     }

@@ -7,6 +7,8 @@ sequences: a turn reversed, given to another joint, shortened or lengthened, two
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -16,9 +18,12 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.errors import StudyError
+from inercal.estimate.executors import Executor, numbered
 from inercal.selfcal.before.bounds import PathBounds, bounds
+from inercal.selfcal.before.left_out import LeftOut, left_out, shifts
 from inercal.selfcal.filters.problem import FilterProblem, problem
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.joint_limits import JointLimits, spans
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.settings import Search, SelfcalSettings
@@ -30,37 +35,54 @@ _EVEN: Final = 1e-6
 """Part of a row that is rounding."""
 
 
-def criterion(bounds: PathBounds, goal: Mapping[str, float], kind: str) -> float:
-    """Largest (``worst``) or geometric mean (``mean``) ratio of each u to its goal, or to its prior without one."""
+def criterion(
+    bounds: PathBounds, goal: Mapping[str, float], kind: str, shifted: Array | float = 0.0
+) -> float:
+    """Largest (``worst``) or geometric mean (``mean``) ratio of each u to its goal, or to its prior without one; u with
+    the variance ``shifted`` (p,) by errors left out."""
     wanted = [goal.get(name, prior) for name, prior in zip(bounds.names, bounds.prior, strict=True)]
-    ratio = bounds.u / wanted
+    ratio = np.sqrt(bounds.u**2 + shifted) / wanted
     return float(ratio.max() if kind == "worst" else np.exp(np.mean(np.log(ratio))))
 
 
 def search(
-    settings: SelfcalSettings, progress: Callable[[int, int], None] = lambda done, total: None
+    settings: SelfcalSettings,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    executor: Executor | None = None,
 ) -> Plan:
-    """The best path that the search finds within rate, time, number of turns, and limits of the gimbals.
+    """The best path that the search finds within rate, time, number of turns, and limits of the joints.
 
-    Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan. An inner gimbal
-    without limits keeps `LIMITS.path_cosine` from lock. ``progress`` is told (done, total) of the random starts.
+    Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan, rates no more than
+    joints can. A path that is to end where it began goes back joint by joint. An inner gimbal without limits
+    keeps `LIMITS.path_cosine` from lock. ``progress`` is told (done, total) of the random starts, which
+    the ``executor`` computes: with the same digits in any.
 
     Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
     ground = _ground(settings)
-    rng = np.random.default_rng(settings.search.seed)
-    criteria: dict[Sequence, float] = {}
-    progress(0, LIMITS.path_starts)
-    for start in range(LIMITS.path_starts):
-        _improve(ground, _random(ground, rng), criteria, rng)
-        progress(start + 1, LIMITS.path_starts)
-    return ground.plan(min(criteria, key=lambda turns: criteria[turns]))
+    streams = tuple(np.random.default_rng(settings.search.seed).spawn(LIMITS.path_starts))
+    found = numbered(_Starts(ground, streams), len(streams), executor, progress)
+    return ground.plan(min(found)[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """The best sequence from each random start, which draws from a stream of its own."""
+
+    ground: _Ground
+    streams: tuple[np.random.Generator, ...]
+
+    def __call__(self, number: int) -> tuple[float, Sequence]:
+        """Its criterion, and the sequence."""
+        rng = self.streams[number]
+        return _improved(self.ground, _random(self.ground, rng), rng)
 
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
     """The ground of a search: ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the
-    start; ``number`` of angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these."""
+    start; ``number`` of angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these; the
+    errors ``left_out`` that count, and what else limits the ``joints``."""
 
     asked: Search
     model: Plan
@@ -71,20 +93,54 @@ class _Ground:
     coarse: float
     problem: FilterProblem
     goal: Mapping[str, float]
+    left_out: LeftOut
+    joints: JointLimits
 
     def plan(self, turns: Sequence) -> Plan:
         """The plan of a sequence, with a rest at its end."""
-        turning, step = self._turning(turns), self.model.step
-        rest = step * math.floor((self.time - turning.duration) / step + _EVEN)
-        return replace(turning, moves=(*turning.moves, Rest(rest))) if rest > 0.0 else turning
+        turning, step = self._turning(self.whole(turns)), self.model.step
+        last = Rest(step * math.floor((self.time - turning.duration) / step + _EVEN))
+        if self.asked.rest > 0.0:
+            last = Rest(last.duration + turning.moves[-1].duration)  # type: ignore[union-attr]
+            turning = replace(turning, moves=turning.moves[:-1])
+        return replace(turning, moves=(*turning.moves, last)) if last.duration > 0.0 else turning
 
     def _turning(self, turns: Sequence) -> Plan:
-        """The turns alone."""
-        moves = tuple(Turn("xyz"[joint], count * self.asked.angle) for joint, count in turns)  # type: ignore[arg-type]
-        return replace(self.model, moves=moves)
+        """The turns, each with its rest."""
+        rests = (Rest(self.asked.rest),) if self.asked.rest > 0.0 else ()
+        moves = (
+            (Turn("xyz"[joint], count * self.asked.angle), *rests)  # type: ignore[arg-type]
+            for joint, count in turns
+        )
+        return self.joints.kept(replace(self.model, moves=tuple(itertools.chain(*moves))))
+
+    def whole(self, turns: Sequence) -> Sequence:
+        """The sequence with the turns back to its start where it is to be closed: in the first order of the joints that
+        no forbidden region bars."""
+        if not self.asked.closed:
+            return turns
+        off = [sum(count for of, count in turns if of == joint) for joint in range(3)]
+        back = [(joint, -off[joint]) for joint in range(3) if off[joint]]
+        orders = (_merged((*turns, *order)) for order in itertools.permutations(back))
+        return next((each for each in orders if self.clear(each)), _merged((*turns, *back)))
+
+    def filled(self, turns: Sequence) -> float:
+        """Time that a sequence turns, in angles of the fastest joint."""
+        rates = [min(self.model.rate, of_joint) for of_joint in self.joints.rate]
+        return sum(abs(count) * max(rates) / rates[joint] for joint, count in self.whole(turns))
+
+    def clear(self, turns: Sequence) -> bool:
+        """True for a sequence that no forbidden region bars."""
+        regions = self.joints.forbidden
+        return not regions or not any(
+            region.meets(*span) for span in spans(self._turning(turns)) for region in regions
+        )
 
     def fits(self, turns: Sequence) -> bool:
         """True for a sequence that keeps to number, limits and time; each turn takes whole rows."""
+        if not turns:
+            return False
+        turns = self.whole(turns)
         if not 0 < len(turns) <= self.asked.turns:
             return False
         if self._turning(turns).duration > self.time + _EVEN * self.model.step:
@@ -94,12 +150,13 @@ class _Ground:
             at[joint] += count
             if not self.low[joint] <= at[joint] <= self.high[joint]:
                 return False
-        return True
+        return self.clear(turns)
 
     def value(self, turns: Sequence) -> float:
         """Criterion of a sequence at coarse steps."""
         path = motion(replace(self.plan(turns), step=self.coarse), self.problem.world)
-        return criterion(bounds(path, self.problem), self.goal, self.asked.criterion)
+        shifted = np.square(shifts(path, self.problem, self.left_out)).sum(axis=1)
+        return criterion(bounds(path, self.problem), self.goal, self.asked.criterion, shifted)
 
 
 def _ground(settings: SelfcalSettings) -> _Ground:
@@ -112,7 +169,8 @@ def _ground(settings: SelfcalSettings) -> _Ground:
     if time / model.step > LIMITS.most_rows:
         text = f"found {time / model.step:.6g} steps of {model.step:g} s"
         raise StudyError("design.time", f"{text}, expected at most {LIMITS.most_rows:,}")
-    unit = asked.angle / model.rate
+    rates = [min(model.rate, of_joint) for of_joint in settings.joints.rate]
+    unit = asked.angle / max(rates)
     number = math.floor(time / unit + 1e-9)
     if number > LIMITS.path_angles:
         text = f"found {number} turns of {math.degrees(asked.angle):g} deg within {time:g} s"
@@ -120,7 +178,14 @@ def _ground(settings: SelfcalSettings) -> _Ground:
             "design.angle", f"{text}, expected at most {LIMITS.path_angles}: a larger angle, or less time"
         )
     low, high = _limits(settings, model)
-    made = _Ground(asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal)
+    made = _Ground(
+        asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal, left_out(settings),
+        settings.joints,
+    )  # fmt: skip
+    if not made.clear(()):
+        raise StudyError(
+            "rig.forbidden", "found the start of the path in a forbidden region, expected it outside"
+        )
     if not any(made.fits(((joint, sign),)) for joint in range(3) for sign in (1, -1)):
         raise StudyError(
             "design.angle",
@@ -158,7 +223,7 @@ def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
 def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
     """A random sequence that fits; of many tries the first that fills the time, or that fills it most."""
     best: Sequence = ()
-    filled = 0
+    filled = 0.0
     for _ in range(200):
         ends = np.sort(rng.integers(0, ground.number + 1, ground.asked.turns - 1))
         lengths = np.diff(ends, prepend=0, append=ground.number)
@@ -168,7 +233,7 @@ def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
             while turns and not ground.fits(turns):
                 joint, count = turns[-1]
                 turns = _merged((*turns[:-1], (joint, count - int(np.sign(count)))))
-        total = sum(abs(count) for _, count in turns)
+        total = ground.filled(turns)
         if total > filled:
             best, filled = turns, total
         if filled == ground.number:
@@ -176,16 +241,9 @@ def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
     return best
 
 
-def _improve(
-    ground: _Ground, turns: Sequence, criteria: dict[Sequence, float], rng: np.random.Generator
-) -> None:
-    """Change a sequence as long as that makes it better; ``criteria`` keeps those of all sequences tried."""
-
-    def value(candidate: Sequence) -> float:
-        if candidate not in criteria:
-            criteria[candidate] = ground.value(candidate)
-        return criteria[candidate]
-
+def _improved(ground: _Ground, turns: Sequence, rng: np.random.Generator) -> tuple[float, Sequence]:
+    """A sequence changed as long as that makes it better, with its criterion."""
+    value = functools.cache(ground.value)
     best, improved = value(turns), True
     while improved:
         improved = False
@@ -195,6 +253,7 @@ def _improve(
             if ground.fits(candidate) and value(candidate) < best:
                 turns, best, improved = candidate, value(candidate), True
                 break
+    return best, turns
 
 
 def _changes(turns: Sequence) -> Iterator[Sequence]:

@@ -15,6 +15,7 @@ from inercal.records.record import Record, record_of
 from inercal.selfcal.before.driven import Driven, drive
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import to_linear
+from inercal.selfcal.platform.joint_limits import beyond
 from inercal.selfcal.platform.kinematics import all_angles, attitude
 from inercal.selfcal.platform.model import Truth, simulate_truth
 from inercal.selfcal.platform.plan import CommandedMotion, motion
@@ -58,10 +59,14 @@ def experiment(settings: SelfcalSettings) -> Experiment:
         raise StudyError("plan", "missing, expected the turns to be simulated")
     if settings.truth is None:
         raise StudyError("truth", "missing, expected the true coefficients")
-    if beyond := settings.plan.beyond(settings.limits):
-        low, high = (math.degrees(end) for end in settings.limits[beyond[0]])
-        text = f"found turns that take {beyond[0]} beyond rig.limits"
+    if too_far := settings.plan.beyond(settings.limits):
+        low, high = (math.degrees(end) for end in settings.limits[too_far[0]])
+        text = f"found turns that take {too_far[0]} beyond rig.limits"
         raise StudyError("plan", f"{text}, expected them within {low:.6g} deg to {high:.6g} deg")
+    if others := beyond(settings.plan, {}, settings.joints):
+        raise StudyError(
+            "plan", f"found {others[0]} beyond the limits of the rig, expected turns within them"
+        )
     commanded = motion(settings.plan, settings.world)
     other, truth = settings.disturbances, settings.truth
     if settings.unread:

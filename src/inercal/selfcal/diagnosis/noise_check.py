@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.consistency import whiteness
+from inercal.estimate.consistency import slow_power, whiteness
 from inercal.estimate.hypotheses import sigmas
 from inercal.findings import EVERYTHING, Finding
 from inercal.records.places import places
@@ -43,8 +43,10 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
             findings.append(Finding("low_scatter", text))
     if findings:
         return findings
-    if not wide and (case[1].noise.base_sway > 0.0 or whiteness(z) > LIMITS.risk):
-        return []  # readings against a base that sways are not independent
+    if not wide and case[1].noise.unsteady:
+        return []  # readings on a base that sways, or vibrates, are not independent
+    if not wide and whiteness(z) > LIMITS.risk:
+        return _wandering(case, z)
     if (swaying := _swaying(case, z)) is not None:
         return [swaying]
     return [unsteady(case) or _unexplained(z)]
@@ -61,6 +63,16 @@ def unsteady(case: Case, any_states: bool = True) -> Finding | None:
     also = "; ".join(each.finding.message.split(":")[0] for each in others if each.white > LIMITS.risk)
     message = best.finding.message + (f"; equally possible: {also}" if also else "")
     return replace(best.finding, message=message)
+
+
+def _wandering(case: Case, z: Array) -> list[Finding]:
+    """Biases of accelerometers that wander and are no states, which slow power shows where nothing else does."""
+    recording, problem = case
+    rows = LIMITS.slow_time / float(np.median(recording.dt))
+    if problem.states.has("accelerometer_walk") or slow_power(z[:, :3], rows) > LIMITS.risk:
+        return []
+    text = "innovations of the accelerometers are correlated over seconds, as where their biases wander: name"
+    return [Finding("unmodelled", f"{text} bias_walk in states under [model]", harm=EVERYTHING)]
 
 
 def _swaying(case: Case, z: Array) -> Finding | None:
@@ -80,7 +92,7 @@ def _swaying(case: Case, z: Array) -> Finding | None:
     wide = len(power) // LIMITS.sway_bands
     band = power[max(largest - wide, 0) : largest + wide + 1]
     amplitude = math.sqrt(2.0 * float(band.sum())) / n * problem.noise.encoder
-    stated = replace(problem.noise, base_sway=amplitude).of_readings
+    stated = replace(problem.noise, base_sway=amplitude, vibration=0.0).of_readings
     if not sound(filtered((recording, replace(problem, noise=stated)))):
         return None
     hertz, seconds = (largest + 1) / (n * dt), math.degrees(amplitude) * 3600.0

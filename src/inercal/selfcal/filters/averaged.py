@@ -91,6 +91,24 @@ def averaged(
     return fewer, replace(problem, noise=noise)
 
 
+def load_kernels(problem: FilterProblem) -> None:
+    """Load, or compile, the kernel of `averaged`."""
+    none = np.empty((0, 3))
+    rows = _Rows(np.empty(0), none, none, none, np.empty(0))
+    full = problem.states.full(problem.mean)
+    nothing = np.empty(0, dtype=np.int64)
+    _average(
+        np.empty((0, 4)),
+        rows,
+        nothing,
+        1,
+        full,
+        problem.states.layout,
+        problem.world,
+        _Means(none, none, none),
+    )
+
+
 def block(recording: Recording) -> int:
     """Rows of a block, an odd number: so many that `LIMITS.judged_rows` blocks are left, and through which the platform
     turns by no more than `LIMITS.block_turn`."""

@@ -108,11 +108,11 @@ def axes_of(th: Array, axes: Axes, signs: Array) -> NDArray[np.int64]:
 
 
 @kernel
-def commanded_rates(th: Array, dt: float, earth: Array, axes: Axes, signs: Array, out: Array) -> None:
+def commanded_rates(th: Array, dt: Array, earth: Array, axes: Axes, signs: Array, out: Array) -> None:
     """Rates ``out`` (n - 1, 3) [rad/s] of the platform against inertial space, in p, that take it from row to row.
 
-    ``th`` (n, 3) [rad] at the rows, ``dt`` [s] between them, ``earth`` (3,) [rad/s] in b; J and attitude are those of
-    the middle of each step.
+    ``th`` (n, 3) [rad] at the rows, ``dt`` (n - 1,) [s] between them, ``earth`` (3,) [rad/s] in b; J and attitude are
+    those of the middle of each step.
     """
     for k in range(len(out)):
         middle = (
@@ -131,7 +131,7 @@ def commanded_rates(th: Array, dt: float, earth: Array, axes: Axes, signs: Array
                     + by_y[i] * (th[k + 1, 1] - th[k, 1])
                     + by_z[i] * (th[k + 1, 2] - th[k, 2])
                 )
-                / dt
+                / dt[k]
             )
 
 

@@ -99,8 +99,10 @@ def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, 
         unit, size = shown_unit(UNIT_OF[name])
         least = u[name] / of_mean
         found.append((usual / least, f"{least / size:.2g} {unit}/sqrt(s) of {key} ({name})"))
-    worst = max(found)
-    return {"bias_walk": worst} if worst[0] > 1.0 else {}
+    if max(found)[0] <= 1.0:
+        return {}
+    # whichever of both: where one may matter, nobody knows that the other is as usual
+    return {"bias_walk": (max(found)[0], ", ".join(text for _, text in sorted(found, reverse=True)))}
 
 
 def systematic(

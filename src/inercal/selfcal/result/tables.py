@@ -201,33 +201,35 @@ def turns(plan: Plan) -> Table:
 
 def paths(designed: Designed) -> Table:
     """The path found beside others of the same time."""
-    rows = []
+    rows, robust = [], any(each.left_out for each in designed.compare)
     for each in designed.compare:
         learned = each.observability.learned
         worst = int(np.argmax(learned.ratio))
+        texts = [", ".join(each.observability.at_prior) or "none", ", ".join(each.beyond) or "none"]
         rows.append(
             (
                 each.name,
                 each.plan.words(),
-                ", ".join(each.observability.at_prior) or "none",
-                ", ".join(each.beyond) or "none",
+                *texts,
+                *([each.worst_shift()] if robust else []),
                 f"{each.plan.duration:.6g}",
                 f"{each.observability.rank} of {len(learned.left)}",
                 f"{short(100.0 * float(learned.ratio[worst]))} ({learned.names[worst]})",
                 short(each.criterion),
             )
         )
+    of_errors = " Errors left out: their largest shift, which counts in the criterion." if robust else ""
     return Table(
         "Comparison of paths",
-        "Left at prior: coefficients of whose prior uncertainty more than half remains. Beyond: gimbals that the path "
-        "takes beyond their limits. Rank: combinations of coefficients of which the path tells something. Largest u: "
+        "Left at prior: coefficients of whose prior uncertainty more than half remains. Beyond: limits that the "
+        f"path breaks.{of_errors} Rank: combinations of coefficients of which the path tells something. Largest u: "
         "the coefficient least known, over its prior. The search makes the criterion small.",
         heads(
-            *("path", "turns", "left at prior", "beyond"),
+            *("path", "turns", "left at prior", "beyond", *(["errors left out"] if robust else [])),
             *("time [s]", "rank", "largest u [% of prior]", "criterion"),
         ),
         tuple(rows),
-        4,
+        5 if robust else 4,
     )
 
 

@@ -17,6 +17,7 @@ from inercal.designs.comparison import PlanFigures, judge
 from inercal.designs.criteria import Criterion, D, a_criterion, i_criterion
 from inercal.designs.exchange import exchange
 from inercal.errors import StudyError
+from inercal.estimate.executors import Executor
 from inercal.findings import Finding
 from inercal.rigs.outputs import table_outputs
 from inercal.rigs.plans import Plan, named
@@ -104,7 +105,11 @@ class Designed:
         return "\n".join([head, *positions, "", *_comparison(self)])
 
 
-def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda _: None) -> Designed:
+def design(
+    settings: TurntableSettings,
+    progress: Callable[[str], None] = lambda _: None,
+    executor: Executor | None = None,
+) -> Designed:
     """Search for positions, and set the best beside other plans.
 
     Parameters
@@ -113,6 +118,8 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
         The instrument with its expected coefficients and noise; the effect of the table's errors depends on them.
     progress : callable
         Takes the progress in words.
+    executor : Executor, optional
+        Place in which the random starts are computed.
 
     Raises
     ------
@@ -136,7 +143,7 @@ def design(settings: TurntableSettings, progress: Callable[[str], None] = lambda
     def search(name: str, candidates: Candidates, criterion: Criterion, allowed: NDArray[np.bool_]) -> None:
         progress(f"searching {asked.positions} positions: {name}")
         rng = np.random.default_rng(asked.seed)
-        choice = exchange(candidates, asked.positions, criterion, rng, allowed=allowed)
+        choice = exchange(candidates, asked.positions, criterion, rng, allowed=allowed, executor=executor)
         plans.append(Plan(name, asked.candidates.angles[choice.chosen]))
 
     criterion = _criterion(asked.criterion, model)

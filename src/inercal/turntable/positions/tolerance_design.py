@@ -178,14 +178,14 @@ def design_tolerances(
     own = tuple(prices[name] for name in settings.chain.factors)
     tried: list[Bought] = []
     for plan in _plans(settings, model):
-        test = _test(plan, settings, model)
+        test = trial(plan, settings, model, goal)
         if test is not None:
             progress(f"tolerances for {plan.name}")
             tried.append(_bought(test, settings, own))
     size = np.ones(len(own))
     for _ in range(2):  # for the tolerances as they are, then for those found
         searched = _searched(settings, model, size, progress)
-        test = None if searched is None else _test(searched, settings, model)
+        test = None if searched is None else trial(searched, settings, model, goal)
         if test is None:
             break
         tried.append(_bought(test, settings, own))
@@ -206,8 +206,14 @@ def _plans(settings: TurntableSettings, model: TableModel) -> list[Plan]:
     return own + [named(name) for name in settings.design.compare if name not in [plan.name for plan in own]]
 
 
-def _test(plan: Plan, settings: TurntableSettings, model: TableModel, repeats: int = 1) -> Trial | None:
-    """The plan as a test; None where it does not identify all terms of the model."""
+def trial(
+    plan: Plan,
+    settings: TurntableSettings,
+    model: TableModel,
+    goal: Mapping[str, float],
+    repeats: int = 1,
+) -> Trial | None:
+    """The plan as a test with that goal; None where it does not identify all terms of the model."""
     used, seen, _ = choose_terms(settings, channels_of(settings), plan.angles)
     if used.symbols != model.symbols or any(each.words for each in seen):
         return None
@@ -223,7 +229,7 @@ def _test(plan: Plan, settings: TurntableSettings, model: TableModel, repeats: i
         beside_inputs(used, angles, c),
         samples_of(settings, angles),
         np.full(len(used.channels), settings.instrument.noise),
-        _wanted(used, c, settings.tolerances.goal),
+        _wanted(used, c, goal),
     )
 
 
@@ -246,7 +252,11 @@ def _bought(test: Trial, settings: TurntableSettings, prices: Sequence[Price]) -
     each = settings.tolerances.position * len(test.plan)
     best, repeats = Bought(test, None, math.inf), 1
     while True:
-        now = test if repeats == 1 else _test(test.plan, settings, test.model, repeats)
+        now = (
+            test
+            if repeats == 1
+            else trial(test.plan, settings, test.model, settings.tolerances.goal, repeats)
+        )
         assert now is not None
         x = cheapest(prices, now.ratios)
         cost = math.inf if x is None else total(prices, x) + each * repeats

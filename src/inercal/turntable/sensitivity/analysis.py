@@ -12,6 +12,7 @@ import numpy as np
 
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
+from inercal.estimate.executors import Executor
 from inercal.estimate.rounding import concise
 from inercal.records.places import counted
 from inercal.rigs.outputs import table_outputs
@@ -105,6 +106,7 @@ def analyse(
     maps: bool = False,
     say: Callable[[str], None] = lambda _: None,
     progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
 ) -> Analysed:
     """Analyse the study's table by the study's method.
 
@@ -117,6 +119,8 @@ def analyse(
         Told, in words, what takes long before the computation begins.
     progress : callable, optional
         Told the positions done and all of them.
+    executor : Executor, optional
+        Place in which positions are sampled.
 
     Raises
     ------
@@ -150,7 +154,7 @@ def analyse(
         clock = time.perf_counter()
         rng = np.random.default_rng(how.seed)
         indices = sampled.analyse(
-            chain, [*outputs, *drifts], angles, how.samples, rng, how.sampling, progress
+            chain, [*outputs, *drifts], angles, how.samples, rng, how.sampling, progress, executor
         )
         indices = replace(indices, method={**indices.method, "seed": how.seed})
         taken = indices.method["samples"]

@@ -11,7 +11,16 @@ from inercal.workbench.bench import said_of
 from inercal.workbench.jobs import Job
 from inercal.workbench.sessions import Session
 
-_STEPS = (("recording", "Recording"), ("study", "Study"), ("run", "Run"), ("result", "Result"))
+_STEPS = (
+    ("recording", "Recording"),
+    ("study", "Study"),
+    ("design", "Design"),
+    ("run", "Run"),
+    ("result", "Result"),
+)
+PATIENCE = 120.0
+"""Time [s] that a page may take where it reads files, on a busy machine."""
+
 _PLACES = (("/", "Home"), ("/instruments", "Instruments"), ("/validation", "Validation"))
 
 

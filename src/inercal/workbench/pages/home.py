@@ -8,6 +8,7 @@ from functools import partial
 from nicegui import ui
 
 from inercal.examples import EXAMPLES
+from inercal.face.foresight import PLANNED
 from inercal.workbench.bench import KINDS, Bench
 from inercal.workbench.pages.frame import button, framed, heading, table, told
 from inercal.workbench.sessions import COMMANDS, Session
@@ -23,12 +24,17 @@ def add(bench: Bench) -> None:
             session = bench.sessions.begin_with(name)
             ui.navigate.to(f"/sessions/{session.id}/recording")
 
+    def plan(kind: str) -> None:
+        with told():
+            session = bench.plan(kind)
+            ui.navigate.to(f"/sessions/{session.id}/design")
+
     @ui.page("/")
-    def home() -> None:
+    def home(every: str = "") -> None:
         with framed("Home"):
             drop()
             heading("Sessions")
-            sessions(bench)
+            sessions(bench, bool(every))
             heading("Shipped examples")
             verbs = {" ".join(words) for words in COMMANDS.values()}
             rows: list[list[str | Callable[[], object]]] = [
@@ -37,6 +43,10 @@ def add(bench: Bench) -> None:
                 if example.verb in verbs and len(example.records) < 3
             ]
             table(["Name", "What it is", ""], rows)
+            heading("Plan a test")
+            with ui.row():
+                for kind in PLANNED:
+                    button(KINDS[kind], partial(plan, kind), label=f"plan: {KINDS[kind]}")
 
 
 def _button(name: str, begin: Callable[[str], None]) -> None:
@@ -55,10 +65,10 @@ def drop() -> None:
         )
 
 
-def sessions(bench: Bench) -> None:
-    """The newest sessions, each with its last job."""
-    rows = []
-    for session in [*bench.sessions][:_SHOWN]:
+def sessions(bench: Bench, every: bool) -> None:
+    """The newest sessions, or every one, each with its last job."""
+    rows, found = [], [*bench.sessions]
+    for session in found if every else found[:_SHOWN]:
         job = bench.last_job(session)
         rows.append(
             [
@@ -74,6 +84,8 @@ def sessions(bench: Bench) -> None:
         )
     if rows:
         table(["Session", "Kind", "Last run", "Begun (UTC)"], rows)
+        if len(found) > len(rows):
+            ui.link(f"Show all {len(found)} sessions", "/?every=1")
     else:
         ui.label("None yet.").classes("quiet")
 

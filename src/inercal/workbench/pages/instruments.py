@@ -12,13 +12,13 @@ from nicegui import ui
 
 from inercal.errors import InercalError
 from inercal.workbench.bench import Bench
-from inercal.workbench.pages.frame import command, framed, refused, table
+from inercal.workbench.pages.frame import PATIENCE, command, framed, refused, table
 
 
 def add(bench: Bench) -> None:
     """Add the pages."""
 
-    @ui.page("/instruments")
+    @ui.page("/instruments", response_timeout=PATIENCE)
     async def show() -> None:
         with framed("Instruments"):
             try:
@@ -50,7 +50,7 @@ def add(bench: Bench) -> None:
                 ],
             )
 
-    @ui.page("/instrument")
+    @ui.page("/instrument", response_timeout=PATIENCE)
     async def one(serial: str) -> None:
         from inercal.face.laboratory import history
 

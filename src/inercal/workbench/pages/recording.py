@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import tomllib
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from nicegui import events, ui
@@ -12,18 +15,19 @@ from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.records.channels import is_channel
 from inercal.workbench.bench import KINDS, Bench, Looked
-from inercal.workbench.charts import figure
+from inercal.workbench.charts import Notes, figure
 from inercal.workbench.form import Widget, as_toml, changed
-from inercal.workbench.pages.frame import button, command, framed, heading, refused, table, told
+from inercal.workbench.pages.frame import PATIENCE, button, command, framed, heading, refused, table, told
 from inercal.workbench.pages.home import drop
+from inercal.workbench.residuals import spans_of
 from inercal.workbench.sessions import MAP, STUDY, Session, put
 
 
 def add(bench: Bench) -> None:
     """Add the page."""
 
-    @ui.page("/sessions/{number}/recording")
-    async def recording(number: str, new: str = "") -> None:
+    @ui.page("/sessions/{number}/recording", response_timeout=PATIENCE)
+    async def recording(number: str, new: str = "", begin: float = math.nan, end: float = math.nan) -> None:
         session = bench.sessions.get(number)
         begun: BaseException | None = None
         if new and session.study is None and session.recordings:
@@ -43,7 +47,7 @@ def add(bench: Bench) -> None:
             with ui.element("div").classes("w-full") as place:
                 ui.spinner()
             await ui.context.client.connected()
-            await _look(bench, session, place)
+            await _look(bench, session, place, (begin, end) if begin < end else None)
             if session.map is not None:
                 heading("Columns to channels")
                 _map(session)
@@ -79,10 +83,11 @@ def _kind(bench: Bench, session: Session) -> None:
     )
 
 
-async def _look(bench: Bench, session: Session, place: ui.element) -> None:
-    """Channels, findings and pictures of the recording."""
+async def _look(bench: Bench, session: Session, place: ui.element, span: tuple[float, float] | None) -> None:
+    """Channels, findings and pictures of the recording, over a ``span`` of time [s] or the whole."""
     try:
         looked = await asyncio.to_thread(bench.look, session)
+        found = await asyncio.to_thread(_rests, bench, session)
     except InercalError as error:
         place.clear()
         with place:
@@ -97,19 +102,34 @@ async def _look(bench: Bench, session: Session, place: ui.element) -> None:
         for finding in findings[:20]:
             where = f" ({finding.where})" if finding.where else ""
             ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
-        _pictures(looked)
+        _pictures(looked, replace(looked.notes, rests=found) if found else looked.notes, span)
         _channels(looked)
 
 
-def _pictures(looked: Looked) -> None:
+def _rests(bench: Bench, session: Session) -> tuple[tuple[float, float], ...]:
+    """Rests as the last calibration took them; empty without one."""
+    job = bench.last_job(session)
+    if job is None or job.result is None:
+        return ()
+    with suppress(InercalError):
+        return spans_of(bench.result(job).estimate.result)
+    return ()
+
+
+def _pictures(looked: Looked, notes: Notes, span: tuple[float, float] | None) -> None:
     """All channels over time; what one zooms to is drawn anew."""
     shown = looked.courses
-    plot = ui.plotly(figure(shown)).classes("w-full").props('aria-label="channels over time" role="group"')
+    plot = ui.plotly(figure(shown, span, notes)).classes("w-full")
+    plot.props('aria-label="channels over time" role="group"')
+    if notes.rests:
+        ui.label(
+            f"{len(notes.rests)} rests are shaded green, turns between them red. Drag to zoom, double-click for all."
+        ).classes("quiet text-sm")
 
     def zoomed(event: events.GenericEventArguments) -> None:
-        moved, span = span_of(event.args)
+        moved, told = span_of(event.args)
         if moved:
-            plot.update_figure(figure(shown, span))
+            plot.update_figure(figure(shown, told, notes))
 
     plot.on("plotly_relayout", zoomed)
 

@@ -3,23 +3,39 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
+from urllib.parse import urlencode
 
-from nicegui import ui
+from nicegui import events, ui
 
 from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.estimate.rounding import rounded
 from inercal.face.result import Result
 from inercal.findings import Status
+from inercal.records.places import counted
+from inercal.workbench.advice import Advice, advice_of
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import Job, State
-from inercal.workbench.pages.frame import button, command, framed, heading, refused, report, table, told
+from inercal.workbench.pages.frame import (
+    PATIENCE,
+    button,
+    command,
+    framed,
+    heading,
+    refused,
+    report,
+    table,
+    told,
+)
+from inercal.workbench.residuals import figure, parts_of
+from inercal.workbench.sessions import Session
 
 
 def add(bench: Bench) -> None:
     """Add the page."""
 
-    @ui.page("/sessions/{number}/result")
+    @ui.page("/sessions/{number}/result", response_timeout=PATIENCE)
     async def show(number: str) -> None:
         session = bench.sessions.get(number)
         with framed("Result", session, "result"):
@@ -32,7 +48,8 @@ def add(bench: Bench) -> None:
             except InercalError as error:
                 refused(error)
                 return
-            _verdict(result)
+            _verdict(bench, session, result)
+            _residuals(session, result)
             if job.report is not None:
                 report(job, "report")
             _coefficients(result)
@@ -42,6 +59,8 @@ def add(bench: Bench) -> None:
                 for name, words in (("result.json", "Result (JSON)"), ("report.html", "Report (HTML)")):
                     if (job.folder / name).is_file():
                         ui.link(words, f"/api/v1/jobs/{job.id}/files/{name}", new_tab=True)
+            if session.kind in ("imu", "strapdown"):
+                _converted(bench, job)
             _compared(bench, job)
             _kept(bench, job)
             _certificate(bench, job)
@@ -52,18 +71,58 @@ def add(bench: Bench) -> None:
 _COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
 
 
-def _verdict(result: Result) -> None:
-    """The verdict in its colour, and what was found."""
+def _verdict(bench: Bench, session: Session, result: Result) -> None:
+    """The verdict in its colour, and what was found, with its advice."""
     ui.label(f"{result.status.value}: {result.message}").classes(
         "verdict " + _COLOURS.get(result.status, "bad")
     ).props('data-verdict="1"')
-    if result.findings:
-        with ui.expansion(f"{len(result.findings)} findings", value=result.status is not Status.OK).classes(
-            "w-full"
-        ):
-            for finding in result.findings:
-                where = f" ({finding.where})" if finding.where else ""
-                ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+    if not result.findings:
+        return
+    study = "" if session.study is None else read_bytes(session.study).decode(errors="replace")
+    advised = {finding: advice_of(finding, study) for finding in result.findings}
+    shown = result.status is not Status.OK or any(advised.values())
+    with ui.expansion(counted(len(result.findings), "finding"), value=shown).classes("w-full"):
+        for finding, advice in advised.items():
+            where = f" ({finding.where})" if finding.where else ""
+            ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+            for each in advice:
+                button(f"Set {each.words}", partial(_take, bench, session, each))
+
+
+def _take(bench: Bench, session: Session, advice: Advice) -> None:
+    """Change the study as a finding advises, and open it."""
+    with told():
+        bench.change(session, advice.path, advice.value)
+        ui.navigate.to(f"/sessions/{session.id}/study")
+
+
+def _residuals(session: Session, result: Result) -> None:
+    """Residuals over the time of the recording; one that is clicked leads to its samples."""
+    parts = parts_of(result.estimate.result)
+    if not parts:
+        return
+    heading("Residuals")
+    plot = ui.plotly(figure(parts)).classes("w-full").props('aria-label="residuals over time" role="group"')
+    place = ui.element("div").props('aria-live="polite" data-chosen="1"')
+    with place:
+        ui.label("Click one to see its samples.").classes("quiet text-sm")
+
+    def choose(event: events.GenericEventArguments) -> None:
+        points = event.args.get("points") if isinstance(event.args, dict) else None
+        if not points:
+            return
+        label, begin, end = points[0]["customdata"]
+        margin = 0.5 * (float(end) - float(begin)) + 1.0
+        plot.update_figure(figure(parts, str(label)))
+        place.clear()
+        with place:
+            target = urlencode({"begin": float(begin) - margin, "end": float(end) + margin})
+            ui.link(
+                f"Samples of {label}, {begin:.5g} s to {end:.5g} s",
+                f"/sessions/{session.id}/recording?{target}",
+            )
+
+    plot.on("plotly_click", choose)
 
 
 def _coefficients(result: Result) -> None:
@@ -91,6 +150,28 @@ def _budget(result: Result) -> None:
             [[name, f"{100 * share:.0f} %"] for name, share in ordered[:12]],
             {1},
         )
+
+
+def _converted(bench: Bench, job: Job) -> None:
+    """The calibration in the files of other tools."""
+    from inercal.convert.other_tools import CONVENTIONS
+
+    links = ui.row()
+
+    async def convert(tool: str) -> None:
+        with told():
+            asked = bench.convert(job, tool)
+            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
+            _say(ended, f"It is written for {tool}.")
+            links.clear()
+            with links:
+                for path in sorted(ended.folder.glob(f"{tool}*")):
+                    ui.link(path.name, f"/api/v1/jobs/{ended.id}/files/{path.name}", new_tab=True)
+
+    with ui.row().classes("items-center"):
+        ui.label("For other tools:")
+        for tool in CONVENTIONS:
+            button(tool, partial(convert, tool), label=f"write for {tool}")
 
 
 def _compared(bench: Bench, job: Job) -> None:

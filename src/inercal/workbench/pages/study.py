@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
-from nicegui import ui
+from nicegui import events, ui
 
 from inercal._files import read_bytes
 from inercal.errors import InercalError
@@ -113,8 +113,7 @@ class Editor:
         """One table: the keys it has, then those it may have."""
         if not given:
             head = f"[{table.name}] {table.says}" if table.name else "Tables of names of one's own"
-            with ui.expansion(head).classes("w-full").props("dense"):
-                self.keys(table.keys)
+            self.folded(head, table.keys)
             return
         heading(f"[{table.name}]" if table.name else "Tables of names of one's own")
         if table.name:
@@ -122,8 +121,20 @@ class Editor:
         self.keys(tuple(key for key in table.keys if key.value))
         more = tuple(key for key in table.keys if not key.value)
         if more:
-            with ui.expansion(f"{len(more)} more keys of [{table.name}]").classes("w-full").props("dense"):
-                self.keys(more)
+            self.folded(f"{len(more)} more keys of [{table.name}]", more)
+
+    def folded(self, head: str, keys: tuple[Key, ...]) -> None:
+        """Keys that are drawn when somebody opens them."""
+        place = ui.expansion(head).classes("w-full").props("dense")
+        drawn: list[bool] = []
+
+        def opened(event: events.ValueChangeEventArguments[bool]) -> None:
+            if event.value and not drawn:
+                drawn.append(True)
+                with place:
+                    self.keys(keys)
+
+        place.on_value_change(opened)
 
     def keys(self, keys: tuple[Key, ...]) -> None:
         """Keys, each as it is typed."""

@@ -1,0 +1,98 @@
+"""Drifts by specific force of a unit whose study does not fit them: how large they may be, and what they do to u.
+
+Nine small drifts shift some coefficient by several u before chi-square tells of them. Of a common size s, each of
+standard deviation s, the last linear problem of a fit gives their likelihood, and given s their mean and covariance.
+The size is not chosen but averaged over, with the Cauchy distribution beyond 0 about the usual size as what is known
+before: where a recording shows that the drifts are smaller, they hardly count.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.budget import TypeB
+from inercal.findings import Finding
+from inercal.records.places import counted_names
+from inercal.strapdown.left_out import Tested
+from inercal.strapdown.limits import LIMITS
+from inercal.strapdown.settings import StrapdownSettings
+from inercal.units import STANDARD_GRAVITY
+
+TERM = "g_sensitivity"
+
+
+class Considered(NamedTuple):
+    """Drifts that are not fitted: their ``usual`` size and that ``left`` by the recording [(rad/s)/(m/s^2)], what they
+    add to the covariance of results, and the finding that tells of them, None where that is little."""
+
+    usual: float
+    left: float
+    source: TypeB
+    finding: Finding | None
+
+
+def usual_size(settings: StrapdownSettings) -> float:
+    """Usual size of drifts by specific force [(rad/s)/(m/s^2)]: that of the study's prior, where it states one, else a
+    part of the gyros' biases for each g."""
+    if TERM in settings.given.get("prior", {}):
+        return float(settings.prior.g_sensitivity)
+    return float(LIMITS.usual_drift * settings.prior.gyro_bias / STANDARD_GRAVITY)
+
+
+def second_moment(score: Array, information: Array, usual: float) -> Array:
+    """Second moment (q, q) of effects about 0, of a record with their ``score`` (q,) and ``information`` (q, q), its
+    alone; all are normal of one size, and that is Cauchy distributed beyond 0, with the median ``usual``."""
+    eigenvalues, axes = np.linalg.eigh(information)
+    along, count = axes.T @ score, LIMITS.sizes
+    # equal shares of the distribution, each by its median
+    variance = np.square(usual * np.tan(0.5 * math.pi * (np.arange(count) + 0.5) / count))[:, None]
+    gain = 1.0 + variance * np.maximum(eigenvalues, 0.0)
+    likelihood = 0.5 * np.sum(variance * along**2 / gain - np.log(gain), axis=1)
+    weight = np.exp(likelihood - likelihood.max())
+    weight /= weight.sum()
+    mean = variance * along / gain
+    moment = np.einsum("k,ka,kb->ab", weight, mean, mean) + np.diag(weight @ (variance / gain))
+    return np.asarray(axes @ moment @ axes.T)
+
+
+def considered(
+    tested: list[Tested], settings: StrapdownSettings, slope: Array, found: tuple[str, ...], u: Array
+) -> Considered | None:
+    """Drifts by specific force among the effects outside the model; None where the study fits them.
+
+    ``slope`` (q, p) is of the results ``found`` by the coefficients of the fit, ``u`` (q,) theirs without the drifts.
+    """
+    each = next((each for each in tested if each.candidate.name == TERM), None)
+    if each is None:
+        return None
+    size, usual = float(each.candidate.prior[0]), usual_size(settings)
+    moment = second_moment(each.score, each.information - np.eye(len(each.score)), usual / size)
+    left = math.sqrt(np.trace(moment) / len(moment))
+    eigenvalues, axes = np.linalg.eigh(moment)
+    parts = slope @ each.moved @ axes * np.sqrt(np.maximum(eigenvalues, 0.0))
+    source = TypeB("drifts by specific force", left * size, "rad/s/(m/s^2)", parts / (left * size))
+    raised = np.linalg.norm(parts, axis=1) > LIMITS.considered_part * u
+    names = [name for name, by in zip(found, raised.tolist(), strict=True) if by]
+    return Considered(
+        usual, left * size, source, _told(settings, left * size, usual, names) if names else None
+    )
+
+
+def _told(settings: StrapdownSettings, left: float, usual: float, names: list[str]) -> Finding:
+    """The finding that tells what drifts that are not fitted do to u."""
+    per_g = 3600.0 * math.degrees(STANDARD_GRAVITY)
+    whence = (
+        "as prior.g_sensitivity states"
+        if TERM in settings.given.get("prior", {})
+        else f"usual, {LIMITS.usual_drift:.2g} of prior.gyro_bias for each g"
+    )
+    return Finding(
+        "considered",
+        f"drifts of the gyros by specific force are not fitted, and count in u of {counted_names(names, 6)}: this "
+        f"recording leaves {per_g * left:.2g} deg/h/g of them ({per_g * usual:.2g} deg/h/g {whence}); state "
+        f'prior.g_sensitivity if they are smaller, or add "{TERM}" to terms',
+    )

@@ -1,0 +1,74 @@
+"""Turns of a strapdown unit before they are made: bounds with a better or worse unit, and the attitudes on the way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.designs.foresight import Course, Foresight, Lever
+from inercal.errors import StudyError
+from inercal.geometry.rotations import elementary
+from inercal.strapdown.bounds import Pieces, bounds
+from inercal.strapdown.design import unit_of
+from inercal.strapdown.settings import Plan, StrapdownSettings
+from inercal.strapdown.simulate import AXES, start_attitude
+
+_OF_NOISE = {
+    "angle_random_walk": ("deg/sqrt(h)", math.radians(1.0) / 60.0),
+    "velocity_random_walk": ("m/s/sqrt(s)", 1.0),
+    "gyro_walk": ("deg/h/sqrt(s)", math.radians(1.0) / 3600.0),
+    "accelerometer_walk": ("m/s^2/sqrt(s)", 1.0),
+}
+"""Sizes of the noise of a study with their units for people."""
+
+_MOMENTS = 12
+"""Moments of a turn."""
+
+
+def foresight(settings: StrapdownSettings) -> Foresight:
+    """Bounds along the plan of a study; the levers are its noise, and the vibration of the stand. Raises `StudyError`
+    without turns."""
+    plan, noise = _plan(settings), settings.noise
+    given = [name for name in _OF_NOISE if getattr(noise, name) > 0.0]
+
+    def u(factors: Array) -> Array:
+        x = factors.tolist()
+        changed = {name: getattr(noise, name) * by for name, by in zip(given, x[:-1], strict=True)}
+        rests = replace(settings.rests, velocity=settings.rests.velocity * x[-1])
+        return bounds(Pieces(replace(settings, noise=replace(noise, **changed), rests=rests)), plan).u
+
+    names = bounds(Pieces(settings), plan).names
+    units, sizes = zip(*map(unit_of, names), strict=True)
+    levers = [
+        Lever(f"noise.{name}", getattr(noise, name) / _OF_NOISE[name][1], _OF_NOISE[name][0])
+        for name in given
+    ]
+    stand = Lever("rests.velocity", settings.rests.velocity, "m/s", "vibration of the stand")
+    return Foresight(names, units, np.array(sizes), (*levers, stand), u)
+
+
+def course(settings: StrapdownSettings) -> Course:
+    """Attitudes along the plan of a study. Raises `StudyError` without turns."""
+    plan = _plan(settings)
+    C = start_attitude(plan)
+    poses, stops, words = [C], [0], ["first rest"]
+    for number, (axis, angle) in enumerate(plan.turns, start=1):
+        parts = np.linspace(0.0, angle, _MOMENTS + 1)[1:]
+        poses += list(C @ elementary(AXES[axis], parts))
+        turn = f"turn {number}: {AXES[axis]} {math.degrees(angle):+.4g} deg"
+        words += [turn] * (_MOMENTS - 1) + [f"{turn}, rest"]
+        stops.append(len(poses) - 1)
+        C = poses[-1]
+    return Course(
+        tuple(words), np.stack(poses)[:, None], np.zeros((1, 3)), np.array(stops), np.zeros((0, 2, 3))
+    )
+
+
+def _plan(settings: StrapdownSettings) -> Plan:
+    """The plan; raises `StudyError` without turns."""
+    if settings.plan is None or not settings.plan.turns:
+        raise StudyError("plan.turns", 'missing, expected turns such as [["y", "90 deg"]]')
+    return settings.plan

@@ -1,0 +1,95 @@
+"""Positions of a turntable before they are taken: uncertainties with better or worse errors, and the axes in motion."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.designs.foresight import Course, Foresight, Lever
+from inercal.errors import StudyError
+from inercal.instruments.terms import shown_unit
+from inercal.rigs.chain import Chain, Joint
+from inercal.turntable.model import channels_of
+from inercal.turntable.positions.fit import choose_terms
+from inercal.turntable.positions.outcome import unit_of_term
+from inercal.turntable.positions.tolerance_design import DRIFT, trial
+from inercal.turntable.settings import TurntableSettings
+
+_MOST = 200
+"""Positions of a test that is looked at."""
+
+_MOMENTS = 6
+"""Moments on the way to a position."""
+
+
+def foresight(settings: TurntableSettings) -> Foresight:
+    """Uncertainties at the positions of a study, and the rms of the predicted output (``drift``); the levers are the
+    noise of a reading and the errors of the table.
+
+    Raises `StudyError` for positions that do not identify the terms, without noise, and for a grid to be analysed.
+    """
+    noise = settings.instrument.noise
+    if noise is None:
+        raise StudyError(
+            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
+        )
+    angles = _angles(settings)
+    used, seen, _ = choose_terms(settings, channels_of(settings), angles)
+    lost = [words for each in seen for words in each.words]
+    if lost:
+        raise StudyError(
+            "positions", f"the positions do not identify {'; '.join(lost)}, expected more of them"
+        )
+    names = (*used.symbols, DRIFT)
+    test = trial(settings.plan, settings, used, dict.fromkeys(names, 1.0))
+    assert test is not None
+
+    def u(factors: Array) -> Array:
+        found = replace(test, noise=test.noise * factors[0]).ratios(factors[1:])
+        return np.sqrt(found.at(factors[1:]))
+
+    unit = settings.instrument.unit
+    shown = [shown_unit(unit_of_term(symbol, unit.si), unit) for symbol in used.symbols]
+    units = (*(text for text, _ in shown), unit.symbol)
+    sizes = np.array([*(size for _, size in shown), unit.factor])
+    levers = [Lever("instrument.noise", noise / unit.factor, unit.symbol, "of a reading")]
+    for error in settings.chain.errors:
+        text, size = shown_unit("m" if error.is_offset else "rad")
+        std = error.distribution.std / size
+        levers.append(Lever(f"rig.errors.{error.name}", std, text, error.what, '{ normal = "{}" }'))
+    return Foresight(names, units, sizes, tuple(levers), u)
+
+
+def course(settings: TurntableSettings) -> Course:
+    """The axes of the table from position to position. Raises `StudyError` for a grid to be analysed."""
+    angles, chain = _angles(settings), settings.chain
+    ways = [np.linspace(a, b, _MOMENTS + 1)[1:] for a, b in itertools.pairwise(angles)]
+    at = np.concatenate([angles[:1], *ways])
+    stops = _MOMENTS * np.arange(len(angles))
+    number = np.minimum(-(-np.arange(len(at)) // _MOMENTS), len(angles) - 1)
+    words = tuple(
+        f"{'position' if row in stops else 'to position'} {k + 1}: "
+        + ", ".join(f"{name} {angle:.4g} deg" for name, angle in zip(chain.joints, each, strict=True))
+        for row, (k, each) in enumerate(zip(number.tolist(), np.degrees(at).tolist(), strict=True))
+    )
+    joints = [k for k, each in enumerate(chain.elements) if isinstance(each, Joint)]
+    ends = [*joints[1:], len(chain.elements)]
+    poses = [Chain(chain.elements[:end]).attitude(at[:, : k + 1]) for k, end in enumerate(ends)]
+    axes = [np.eye(3)["xyz".index(each.axis)] for each in chain.elements if isinstance(each, Joint)]
+    return Course(words, np.stack(poses, axis=1), np.array(axes), stops, np.zeros((0, 2, 3)))
+
+
+def _angles(settings: TurntableSettings) -> Array:
+    """Angles of the positions of a study; raises `StudyError` for too many."""
+    if settings.rate_test is not None or settings.step_test is not None:
+        raise StudyError("rate_test", "found a test of rates or steps, expected one of positions")
+    if len(settings.plan) > _MOST:
+        raise StudyError(
+            "positions",
+            f"found the {settings.plan.name} with {len(settings.plan)} positions, expected those of a test, {_MOST} at "
+            'most, such as plan = "24-position"',
+        )
+    return settings.plan.angles

@@ -1,0 +1,61 @@
+"""The advice of a finding as a change of the study, where it is one."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from inercal.errors import InputError
+from inercal.findings import Finding
+from inercal.workbench.form import changed, parsed
+
+_SET = re.compile(r"\bset ([a-z_]\w*(?:\.\w+)+) = (true|false|\"[^\"]*\"|[-+.\de]+\d)")
+_UNDER = re.compile(
+    r"\b(?:write|state|take) (\w+) = (\"[^\"]*\"|true|false|[-+.\de]*\d)[^;\[]{0,60}? under \[([\w.]+)\]"
+)
+_STATES = re.compile(r"\bname ([\w, ]+?) in states under \[model\]")
+"""The words in which findings say what to write: a key and its value, or kinds of states of a platform."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A change of the study: the key at ``path``, its ``value`` in TOML, and in words."""
+
+    path: str
+    value: str
+
+    @property
+    def words(self) -> str:
+        """The change as a line of the study."""
+        return f"{self.path} = {self.value}"
+
+
+def advice_of(finding: Finding, study: str) -> tuple[Advice, ...]:
+    """Changes of the text of a study that a finding advises, without those that it has already."""
+    found = [Advice(match[1], match[2]) for match in _SET.finditer(finding.message)]
+    found += [Advice(f"{match[3]}.{match[1]}", match[2]) for match in _UNDER.finditer(finding.message)]
+    for match in _STATES.finditer(finding.message):
+        kinds = [kind for kind in re.split(r", | or | and ", match[1]) if re.fullmatch(r"\w+", kind)]
+        found += [each for each in [_with_states(kinds[:1], study)] if each is not None]
+    return tuple(dict.fromkeys(each for each in found if _changes(each, study)))
+
+
+def _with_states(kinds: list[str], study: str) -> Advice | None:
+    """Kinds of states beside those that a study names; None where it has them."""
+    try:
+        model = parsed(study).get("model", {})
+    except InputError:
+        return None
+    given: Any = model.get("states", "rig")
+    listed = [given] if isinstance(given, str) else list(given)
+    added = [kind for kind in kinds if kind not in listed]
+    return Advice("model.states", str([*listed, *added]).replace("'", '"')) if added else None
+
+
+def _changes(advice: Advice, study: str) -> bool:
+    """True for a change that can be made, and is one."""
+    try:
+        return parsed(changed(study, advice.path, advice.value)) != parsed(study)
+    except InputError:
+        return False

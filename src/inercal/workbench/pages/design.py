@@ -1,0 +1,309 @@
+"""Design: a test before it is made: its plan on a sphere and in motion, and the uncertainties to expect."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shlex
+from collections.abc import Callable
+
+import numpy as np
+from nicegui import events, ui
+
+from inercal._files import read_bytes
+from inercal.arrays import Array
+from inercal.designs.foresight import Course, Foresight
+from inercal.errors import InercalError
+from inercal.estimate.rounding import short
+from inercal.workbench.bench import Bench
+from inercal.workbench.jobs import ENDED, Job, State
+from inercal.workbench.pages.frame import (
+    PATIENCE,
+    button,
+    command,
+    framed,
+    heading,
+    refused,
+    report,
+    table,
+    told,
+)
+from inercal.workbench.pages.run import WORDS
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
+from inercal.workbench.scenes import gimbals, motion, sphere
+from inercal.workbench.sessions import STUDY, Session, put
+
+_MIDDLE, _END = 50, 100
+"""Places of a slider: as stated in the middle, where a browser puts it, ten times as much or a tenth at the ends."""
+
+
+def add(bench: Bench) -> None:
+    """Add the page."""
+
+    @ui.page("/sessions/{number}/design", response_timeout=PATIENCE)
+    async def design(number: str) -> None:
+        session = bench.sessions.get(number)
+        with framed("Design", session, "design"):
+            if session.kind not in KINDS:
+                ui.label("An IMU that is moved by hand has no plan: its poses are found from the recording.")
+                return
+            if session.study is None:
+                ui.label("There is no study yet, which would say what is planned.")
+                ui.link("Begin one", f"/sessions/{session.id}/study")
+                return
+            ui.add_head_html('<script src="/static/motion.js" defer></script>')
+            desk = Desk(bench, session)
+            await ui.context.client.connected()
+            await desk.judge()
+
+
+class Desk:
+    """The plan of a study, edited as lines; what is shown follows."""
+
+    def __init__(self, bench: Bench, session: Session) -> None:
+        self.bench, self.session, self.kind = bench, session, KINDS[session.kind]
+        self.foresight: Foresight | None = None
+        self.factors: Array = np.ones(0)
+        self.text = read_bytes(session.folder / STUDY).decode(errors="replace")
+        self.verdict = ui.label().props('role="status" data-verdict="1"')
+        with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
+            with ui.element("div"):
+                self._plan()
+            self.views = ui.element("div").classes("w-full")
+        with self.views:
+            heading("The test in motion")
+            with ui.element("div").classes("w-full grid grid-cols-1 gap-2 sm:grid-cols-2") as self.scenes:
+                ui.spinner()
+            self._moments()
+        heading("What if")
+        ui.label("Move a slider: the uncertainties follow. In the middle is what the study states.").classes(
+            "quiet"
+        )
+        with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
+            self.levers = ui.element("div").classes("w-full")
+            self.numbers = ui.element("div").classes("w-full md:sticky md:top-2 self-start")
+        heading("A better plan")
+        button("Search", self.search)
+        self.same = ui.element("div").classes("w-full")
+        self.found = ui.element("div").classes("w-full")
+        job = bench.last_design(session)
+        if job is not None:
+            self.follow(job)
+
+    def _plan(self) -> None:
+        """The plan as lines, and plans by their name."""
+        heading("The plan")
+        if self.kind.named:
+            names = list(self.kind.named)
+            ui.select(names, label="Begin with", on_change=lambda event: self.named(event.value)).classes(
+                "w-full"
+            )
+        self.lines = ui.textarea(on_change=lambda event: self.typed(event.value))
+        self.lines.props('outlined debounce=300 aria-label="plan, a line each" input-style="height: 19rem"')
+        self.lines.classes("w-full command")
+        ui.label(f"A line each: {self.kind.says}. What is typed is written into the study.").classes(
+            "quiet text-sm"
+        )
+
+    def _moments(self) -> None:
+        """The slider over the moments of the test, and its words."""
+        with ui.row(wrap=False).classes("w-full items-center"):
+            button("Play", lambda: None, label="play or stop the test").on(
+                "click", js_handler="() => inercalPlay()"
+            )
+            ui.element("input").props(
+                'type=range id=moment min=0 max=0 aria-label="moment of the test" oninput="inercalMoment()"'
+            ).classes("grow")
+        ui.element("div").props('id=moment-words aria-live="off"').classes("quiet text-sm")
+
+    async def named(self, name: str) -> None:
+        """Take a plan by its name."""
+        with told():
+            await self.write(with_keys(self.text, self.kind.named[name]))
+
+    async def typed(self, lines: str) -> None:
+        """The lines were changed: so is the study."""
+        if lines == self.shown:
+            return
+        try:
+            await self.write(with_lines(self.session.kind, self.text, lines), lines)
+        except InercalError as error:
+            self.say(str(error), False)
+
+    async def write(self, text: str, lines: str | None = None) -> None:
+        """Write the study with another plan, and judge it."""
+        put(self.session, STUDY, text)
+        self.text = text
+        await self.judge(lines)
+
+    shown = ""
+    """The lines as they are shown."""
+
+    async def judge(self, lines: str | None = None) -> None:
+        """Show what the plan makes expect; ``lines`` were typed, and stay as they are."""
+        try:
+            study, foresight, course = await asyncio.to_thread(self.bench.foreseen, self.session)
+        except InercalError as error:
+            self.say(str(error), False)
+            self.foresight = None
+            for each in (self.levers, self.numbers, self.same):
+                each.clear()
+            self.scenes.clear()
+            return
+        self.shown = lines_of(study) if lines is None else lines
+        self.lines.set_value(self.shown)
+        self.foresight, self.factors = foresight, np.ones(len(foresight.levers))
+        self.draw(course)
+        self.table(foresight)
+        self.sliders(foresight)
+        self.repeat()
+        count = f"{len(course.stops)} stops, " if len(course.stops) else ""
+        self.say(f"{count}{len(foresight.names)} values are predicted.", True)
+
+    def say(self, words: str, good: bool) -> None:
+        """The line above all."""
+        self.verdict.set_text(words)
+        self.verdict.classes(replace="ok" if good else "bad")
+
+    def draw(self, course: Course) -> None:
+        """The sphere and the gimbals."""
+        self.scenes.clear()
+        drawn = {"What turns; drag to look from elsewhere": gimbals(course)}
+        if len(course.stops):
+            drawn = {"Where up is on the instrument at each stop": sphere(course), **drawn}
+        places = {}
+        with self.scenes:
+            for words, scene in drawn.items():
+                with ui.element("div"):
+                    plot = ui.plotly(scene.figure).classes("w-full").props(f'aria-label="{words}" role="img"')
+                    ui.label(words).classes("quiet text-sm")
+                places[plot.html_id] = scene
+        ui.run_javascript(f"inercalMotion({json.dumps(motion(course, places))})")
+
+    def table(self, foresight: Foresight) -> None:
+        """Uncertainties as stated and now, with the largest source."""
+        self.numbers.clear()
+        self.before = foresight.u(self.factors)
+        made: list[ui.label] = []
+
+        def cell() -> None:
+            made.append(ui.label())
+
+        texts = zip(foresight.names, foresight.units, (self.before / foresight.sizes).tolist(), strict=True)
+        rows: list[list[str | Callable[[], object]]] = [
+            [name, short(u), cell, unit, cell, cell] for name, unit, u in texts
+        ]
+        with self.numbers:
+            table(["Value", "u as stated", "u now", "Unit", "Times", "Mostly from"], rows, {1, 2, 4})
+        self.cells = list(zip(made[0::3], made[1::3], made[2::3], strict=True))
+        self.show()
+        self.share()
+
+    def show(self) -> None:
+        """The uncertainties with the sliders as they are."""
+        assert self.foresight is not None
+        u = self.foresight.u(self.factors)
+        for (now, times, _), value, ratio in zip(
+            self.cells, (u / self.foresight.sizes).tolist(), (u / self.before).tolist(), strict=True
+        ):
+            now.set_text(short(value))
+            times.set_text(f"{ratio:.2f}")
+
+    def share(self) -> None:
+        """The largest source of each uncertainty."""
+        assert self.foresight is not None
+        shares = self.foresight.shares(self.factors)
+        for k, (_, _, source) in enumerate(self.cells):
+            first = int(np.argmax(shares[:, k]))
+            rest = 1.0 - float(shares[:, k].sum())
+            name, part = self.foresight.levers[first].key.rpartition(".")[2], float(shares[first, k])
+            if rest > part:
+                name, part = "prior and site", rest
+            source.set_text(f"{name} {100.0 * part:.0f} %")
+
+    def sliders(self, foresight: Foresight) -> None:
+        """A slider for each size that the study states."""
+        self.levers.clear()
+        with self.levers:
+            for k, lever in enumerate(foresight.levers):
+                words = ui.label(f"{lever.key}: {lever.quantity()}").classes("text-sm")
+                if lever.says:
+                    ui.label(lever.says).classes("quiet text-sm")
+                slider = ui.element("input").classes("w-full mb-2")
+                slider.props(f'type=range min=0 max={_END} step=2 aria-label="{lever.key}"')
+                self.follow_slider(slider, words, k)
+            button("As stated", lambda: self.judge(self.shown))
+
+    def follow_slider(self, slider: ui.element, words: ui.label, k: int) -> None:
+        """Have the uncertainties follow a slider; the shares, when it is let go."""
+
+        def moved(event: events.GenericEventArguments) -> None:
+            foresight = self.foresight
+            if foresight is None or k >= len(self.factors):
+                return
+            factor = float(10.0 ** (float(event.args) / _MIDDLE - 1.0))
+            self.factors[k] = factor
+            lever = foresight.levers[k]
+            times = "" if factor == 1.0 else f" ({factor:.2g} times)"
+            words.set_text(f"{lever.key}: {lever.quantity(factor)}{times}")
+            self.show()
+
+        def released() -> None:
+            if self.foresight is not None:
+                self.share()
+                self.repeat()
+
+        slider.on("input", moved, throttle=0.05, js_handler="(event) => emit(event.target.value)")
+        slider.on("change", released)
+
+    def settings(self) -> list[str]:
+        """The sizes that sliders set, as ``--set`` takes it."""
+        assert self.foresight is not None
+        pairs = zip(self.foresight.levers, self.factors.tolist(), strict=True)
+        return [lever.setting(factor) for lever, factor in pairs if abs(factor - 1.0) > 1e-9]
+
+    def repeat(self) -> None:
+        """The command that judges and searches with the same sizes."""
+        self.same.clear()
+        sets = [word for each in self.settings() for word in ("--set", each)]
+        out = ["--out", f"plan{self.kind.ending}", "--report", "design.html"]
+        with self.same:
+            command(shlex.join(["inercal", *self.kind.command, STUDY, *sets, *out]))
+
+    def search(self) -> None:
+        """Begin the search for a better plan."""
+        with told():
+            sets = [] if self.foresight is None else self.settings()
+            self.follow(self.bench.design(self.session, sets))
+
+    def follow(self, job: Job) -> None:
+        """The state of a search, and what it found."""
+        self.found.clear()
+        with self.found:
+            state = ui.label().props('role="status" data-search="1"')
+            place = ui.element("div").classes("w-full")
+        plan = job.folder / f"plan{self.kind.ending}"
+
+        def look() -> None:
+            now = self.bench.queue.get(job.id)
+            of = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
+            state.set_text(f"The search (job {now.id}) {WORDS[now.state]}{of}")
+            if now.state not in ENDED:
+                return
+            timer.deactivate()
+            with place:
+                if now.said.strip() and now.state is not State.DONE:
+                    refused(InercalError(now.said.strip()))
+                if plan.is_file():
+                    button("Take the plan found", lambda: self.take(plan.read_text()), main=True)
+                if now.report is not None:
+                    report(now, "search for a plan")
+
+        with self.found:
+            timer = ui.timer(0.3, look)
+
+    async def take(self, found: str) -> None:
+        """Write the plan found into the study."""
+        with told():
+            await self.write(with_found(self.session.kind, self.text, found))
+            ui.notify("The plan found is in the study.", type="positive")

@@ -1,0 +1,169 @@
+"""Residuals of a result, each with the time of the recording that it is of: a picture of plotly of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from inercal.instruments.terms import shown_unit
+from inercal.report.style import COLOURS
+
+
+@dataclass(frozen=True)
+class Part:
+    """Residuals of one kind: what they are, their unit for people, and of each (label, begin, end [s], value)."""
+
+    what: str
+    unit: str
+    rows: tuple[tuple[str, float, float, float], ...]
+
+
+def parts_of(result: Mapping[str, Any]) -> tuple[Part, ...]:
+    """The residuals in the command's part of a result (`inercal.estimate.result.Estimate`); none where it has none."""
+    found = [*_poses(result), *_turns(result), *_rests(result), *_unit_turns(result), *_points(result)]
+    return tuple(part for part in found if part.rows)
+
+
+def spans_of(result: Mapping[str, Any]) -> tuple[tuple[float, float], ...]:
+    """Stretches (begin, end) [s] that a result took as rests; empty where it does not say."""
+    if "intervals" in result:
+        return tuple((float(each["start_s"]), float(each["end_s"])) for each in result["intervals"])
+    if "rests" in result:
+        return tuple(_span(each) for each in result["rests"])
+    return tuple((float(each["begin"]), float(each["end"])) for each in result.get("points") or ())
+
+
+def _span(rest: Any) -> tuple[float, float]:
+    """A rest as a pair of times, or as an object."""
+    if isinstance(rest, Mapping):
+        return float(rest["start_s"]), float(rest["end_s"])
+    return float(rest[0]), float(rest[1])
+
+
+def _poses(result: Mapping[str, Any]) -> Iterator[Part]:
+    """Of |f| in the poses of an IMU moved by hand."""
+    unit, size = shown_unit("m/s^2")
+    yield Part(
+        "|f| − g of poses",
+        unit,
+        tuple(
+            (f"pose {each['pose']}", each["start_s"], each["end_s"], each["residual_m_s2"] / size)
+            for each in result.get("intervals", ())
+            if each.get("residual_m_s2") is not None
+        ),
+    )
+
+
+def _turns(result: Mapping[str, Any]) -> Iterator[Part]:
+    """Of the turns between poses."""
+    unit, size = shown_unit("rad")
+    yield Part(
+        "miss of turns",
+        unit,
+        tuple(
+            (
+                f"turn from pose {each['from_pose']}",
+                each["start_s"],
+                each["start_s"] + each["duration_s"],
+                each["miss_rad"] / size,
+            )
+            for each in result.get("turns", ())
+            if each.get("miss_rad") is not None
+        ),
+    )
+
+
+def _rests(result: Mapping[str, Any]) -> Iterator[Part]:
+    """Of the rests of an IMU on a table, axis by axis, in the units of its outputs."""
+    rests = [each for each in result.get("rests", ()) if isinstance(each, Mapping)]
+    for sensor in ("acc", "gyro"):
+        unit = str(result.get("unit", {}).get(sensor, "")) if rests else ""
+        text, size = shown_unit(unit)
+        for k, axis in enumerate("xyz"):
+            rows = [
+                (f"rest {n}", *_span(each), each[f"residual_{sensor}"][k] / size)
+                for n, each in enumerate(rests, start=1)
+                if each.get(f"residual_{sensor}")
+            ]
+            yield Part(f"{sensor}_{axis} at rest", text, tuple(rows))
+
+
+def _unit_turns(result: Mapping[str, Any]) -> Iterator[Part]:
+    """Of the turns of a strapdown unit, over their noise."""
+    rests = [_span(each) for each in result.get("rests", ())]
+    rows = [
+        (f"turn {n}", before[1], after[0], each["residual_z"])
+        for n, (each, before, after) in enumerate(
+            zip(result.get("turns", ()), rests, rests[1:], strict=False), start=1
+        )
+        if each.get("residual_z") is not None
+    ]
+    yield Part("turns, over noise", "1", tuple(rows))
+
+
+def _points(result: Mapping[str, Any]) -> Iterator[Part]:
+    """Scatter of the angle within the points of a run in a tunnel."""
+    rows = [
+        (f"point {each['number']:g}", each["begin"], each["end"], math.degrees(each["scatter"]))
+        for each in result.get("points") or ()
+        if each.get("scatter") is not None and each.get("number") is not None
+    ]
+    yield Part("scatter of points", "deg", tuple(rows))
+
+
+def figure(parts: Sequence[Part], chosen: str = "") -> dict[str, Any]:
+    """Residuals over the time of the recording, a panel for each kind; the ``chosen`` one is marked."""
+    panels = list(dict.fromkeys(_panel(part) for part in parts))
+    height = 1.0 / max(len(panels), 1)
+    data = []
+    for part in parts:
+        axis = panels.index(_panel(part)) + 1
+        middles = [0.5 * (begin + end) for _, begin, end, _ in part.rows]
+        own = [each for each in parts if _panel(each) == _panel(part)]
+        colours = COLOURS[own.index(part) % len(COLOURS)]
+        data.append(
+            {
+                "type": "scatter", "mode": "markers", "name": part.what, "x": middles,
+                "y": [value for *_, value in part.rows], "yaxis": f"y{axis}" if axis > 1 else "y",
+                "customdata": [[label, begin, end] for label, begin, end, _ in part.rows],
+                "marker": {
+                    "color": ["#C03A2B" if label == chosen else colours for label, *_ in part.rows],
+                    "size": [13 if label == chosen else 8 for label, *_ in part.rows],
+                },
+                "hovertemplate": "%{customdata[0]}: %{y:.4g} " + part.unit + "<extra></extra>",
+            }
+        )  # fmt: skip
+    layout: dict[str, Any] = {
+        "xaxis": {
+            "title": {"text": "time [s]"},
+            "anchor": f"y{len(panels)}" if len(panels) > 1 else "y",
+            "gridcolor": "rgba(128,128,128,0.25)",
+            "zeroline": False,
+        },
+        "hovermode": "closest",
+        "uirevision": "kept",
+        "showlegend": len(parts) > len(panels),
+        "legend": {"orientation": "h", "y": 1.06},
+        "margin": {"l": 70, "r": 15, "t": 20, "b": 45},
+        "height": 210 * len(panels) + 60,
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"color": "#7A858F"},
+    }
+    for k, panel in enumerate(panels):
+        layout["yaxis" if k == 0 else f"yaxis{k + 1}"] = {
+            "title": {"text": panel},
+            "domain": [1.0 - (k + 0.85) * height, 1.0 - k * height],
+            "gridcolor": "rgba(128,128,128,0.25)",
+            "zerolinecolor": "rgba(128,128,128,0.6)",
+            "automargin": True,
+        }
+    return {"data": data, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
+
+
+def _panel(part: Part) -> str:
+    """The title of the panel that a part is drawn in: axes of a sensor share one."""
+    of = part.what.split("_")[0] if part.what[-4:] == "rest" else part.what
+    return f"{of} [{part.unit}]"

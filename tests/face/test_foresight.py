@@ -1,0 +1,128 @@
+"""Plans before the test: u against the searches', levers against keys of a study, courses in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import inercal as ic
+from inercal.aoa.motion import course as pitch_of
+from inercal.aoa.motion import duration
+from inercal.errors import InercalError
+from inercal.examples import FOLDER
+from inercal.face.foresight import course, foresight
+from inercal.face.study import read_study
+from inercal.geometry.rotations import to_matrix
+from inercal.rigs.plans import named
+from inercal.selfcal.before.bounds import bounds
+from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.plan import motion
+from inercal.strapdown.bounds import Pieces
+from inercal.strapdown.bounds import bounds as turn_bounds
+from inercal.turntable.model import channels_of
+from inercal.turntable.positions.fit import choose_terms
+from inercal.turntable.positions.planning import design
+from inercal.turntable.positions.tolerance_design import trial
+
+TURNS = '\n[plan]\nturns = [["y", "90 deg"], ["z", "-90 deg"], ["x", "90 deg"], ["y", "180 deg"]]\n'
+FILES = {
+    "turntable": "gyro.toml",
+    "selfcal": "selfcal.toml",
+    "strapdown": "strapdown.toml",
+    "aoa": "sting.toml",
+}
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory):
+    """A study of each kind, read with what is set beside it."""
+    folder = tmp_path_factory.mktemp("plans")
+    for name in FILES.values():
+        text = (FOLDER / name).read_text()
+        (folder / name).write_text(text + (TURNS if name == "strapdown.toml" else ""))
+    return lambda kind, *sets: read_study(kind, folder / FILES[kind], sets)
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_lever_does_what_its_key_in_the_study_does(studies, kind):
+    whole = foresight(studies(kind))
+    one = np.ones(len(whole.levers))
+    for k, lever in enumerate(whole.levers[:6]):
+        halved = foresight(studies(kind, lever.setting(0.5)))
+        factors = one.copy()
+        factors[k] = 0.5
+        np.testing.assert_allclose(whole.u(factors), halved.u(one), rtol=1e-3)  # four digits are written
+
+
+def test_uncertainties_of_positions_are_those_of_their_design(studies):
+    settings = studies("turntable").settings
+    asked = replace(settings.design, candidates=named("24-position"), compare=("24-position",))
+    judged = design(replace(settings, plan=named("12-position"), design=asked)).judged
+    expected = next(each for each in judged if each.plan.name == "24-position").figures
+    found = foresight(studies("turntable"))
+    u = found.u(np.ones(len(found.levers)))
+    np.testing.assert_allclose(u, [*expected.u, expected.rms_prediction], rtol=1e-9)
+
+
+def test_shares_of_a_path_are_those_of_the_covariance_split_by_source(studies):
+    """Joseph's form splits the covariance along the path; here it comes from its change with the noise."""
+    settings, found = studies("selfcal").settings, foresight(studies("selfcal"))
+    along = bounds(motion(settings.plan, settings.world), problem(settings), contributions=True)
+    expected = [along.shares[source] for source in ("angle random walk", "accelerometer", "encoder")]
+    np.testing.assert_allclose(found.shares(np.ones(3)), expected, atol=1e-3)
+
+
+def test_shares_of_positions_are_those_of_the_gain(studies):
+    settings, found = studies("turntable").settings, foresight(studies("turntable"))
+    used = choose_terms(settings, channels_of(settings), settings.plan.angles)[0]
+    test = trial(settings.plan, settings, used, dict.fromkeys(found.names, 1.0))
+    noise, inputs, errors = test.parts(np.ones(len(settings.chain.errors)))
+    whole = noise + inputs.sum(axis=1) + errors.sum(axis=1)
+    expected = np.vstack([noise, errors.T]) / whole
+    np.testing.assert_allclose(found.shares(np.ones(len(found.levers))), expected, atol=1e-4)
+
+
+def test_gimbals_stand_as_the_kinematics_have_them(studies):
+    settings, shown = studies("selfcal").settings, course(studies("selfcal"))
+    world = settings.world
+    vertical = world.up / np.linalg.norm(world.up)
+    at = settings.plan.angles()[np.cumsum([0, *map(settings.plan.steps, settings.plan.moves)])]
+    for stop, angles in zip(shown.stops, at, strict=True):
+        C_bp = to_matrix(np.array(attitude(angles, world.axes, world.signs)))
+        np.testing.assert_allclose(shown.up[stop], C_bp.T @ vertical, atol=1e-12)
+    assert len(shown.words) == len(shown.poses)
+
+
+def test_the_vertical_of_a_table_and_of_turns_is_that_of_their_models(studies):
+    settings, shown = studies("turntable").settings, course(studies("turntable"))
+    C = settings.chain.attitude(settings.plan.angles)
+    np.testing.assert_allclose(shown.up[shown.stops], C[:, 2, :], atol=1e-12)
+    settings, shown = studies("strapdown").settings, course(studies("strapdown"))
+    along = turn_bounds(Pieces(settings), settings.plan)
+    np.testing.assert_allclose(shown.up[shown.stops], along.up, atol=1e-9)
+
+
+def test_sensors_of_a_model_rise_by_the_sine_that_they_read(studies):
+    study = studies("aoa")
+    plan, shown = study.settings.motion, course(study)
+    t = np.linspace(0.0, duration(plan), len(shown.poses))
+    theta = pitch_of(plan, np.random.default_rng(0))(t)[0]
+    rise = (shown.poses[:, 0] @ shown.sensors[:, 1].T)[:, 2]
+    np.testing.assert_allclose(rise, np.sin(theta[:, None] - study.settings.layout.angle), atol=1e-12)
+
+
+def test_a_plan_that_cannot_be_judged_is_refused_in_a_sentence(studies, tmp_path):
+    with pytest.raises(InercalError, match="do not identify"):
+        foresight(studies("turntable", "positions.plan=6-position"))
+    with pytest.raises(InercalError, match="kind imu"):
+        foresight(ic.study("imu", latitude="45 deg"))
+    for kind, before, after, words in (
+        ("strapdown", "[rests]", "[rests]", "turns"),
+        ("turntable", 'plan = "24-position"', "grid = { phi1 = 36, phi2 = 36 }", "1296 positions"),
+        ("turntable", 'noise = "0.01 deg/h"', "", "instrument.noise"),
+    ):
+        path = tmp_path / f"{kind}.toml"
+        path.write_text((FOLDER / FILES[kind]).read_text().replace(before, after))
+        with pytest.raises(InercalError, match=words):
+            foresight(read_study(kind, path))

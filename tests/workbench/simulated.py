@@ -1,0 +1,30 @@
+"""Pages without a browser: NiceGUI's own user, for what a page says and does."""
+
+import asyncio
+from functools import wraps
+
+from nicegui.testing.user_simulation import user_simulation
+
+from inercal.workbench.bench import open_bench
+
+
+def of_user(test):
+    """A test ``async (user, bench, ...)`` on the pages of a bench in ``tmp_path``."""
+
+    @wraps(test)
+    def run(tmp_path, **given):
+        async def simulated():
+            bench = open_bench(tmp_path / "work", str(tmp_path / "store"))
+            try:
+                async with user_simulation() as user:
+                    from inercal.workbench.pages import add_pages
+
+                    add_pages(bench)
+                    await test(user, bench, **given)
+            finally:
+                bench.close()
+
+        asyncio.run(simulated())
+
+    del run.__wrapped__
+    return run

@@ -1,0 +1,92 @@
+"""Plans as lines: they come back as they were, and what a search wrote becomes the plan of the study."""
+
+import numpy as np
+import pytest
+
+from inercal.errors import InputError
+from inercal.examples import FOLDER
+from inercal.face.foresight import course
+from inercal.face.study import read_study
+from inercal.workbench.form import changed
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
+from inercal.workbench.scenes import gimbals, motion, sphere
+
+FILES = {
+    "turntable": "gyro.toml",
+    "selfcal": "selfcal.toml",
+    "strapdown": "strapdown.toml",
+    "aoa": "sting.toml",
+}
+
+
+@pytest.fixture
+def study(tmp_path):
+    def read(kind, text):
+        (tmp_path / "study.toml").write_text(text)
+        return read_study(kind, tmp_path / "study.toml")
+
+    return read
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_lines_of_a_plan_make_the_same_plan(kind, study):
+    before = (FOLDER / FILES[kind]).read_text()
+    for keys in list(KINDS[kind].named.values()) or [{}]:
+        text = with_keys(before, keys)
+        lines = lines_of(study(kind, text))
+        again = with_lines(kind, text, lines)
+        assert lines_of(study(kind, again)) == lines
+        np.testing.assert_allclose(course(study(kind, text)).up, course(study(kind, again)).up, atol=1e-9)
+
+
+def test_a_line_that_is_none_is_refused_and_one_added_is_there(study):
+    text = (FOLDER / "selfcal.toml").read_text()
+    with pytest.raises(InputError, match="no line"):
+        with_lines("selfcal", text, " \n")
+    added = with_lines("selfcal", text, "z, 180 deg\nrest, 5 s\n\nx, -90 deg, 2 deg/s")
+    assert lines_of(study("selfcal", added)).splitlines() == [
+        "z, 180 deg",
+        "rest, 5 s",
+        "x, -90 deg, 2 deg/s",
+    ]
+    text = (FOLDER / "sting.toml").read_text()
+    with pytest.raises(InputError, match="name, axis, place"):
+        with_lines("aoa", text, "a1, +x")
+    fewer = with_lines("aoa", text, "a1, -z, -0.2 m\na2, +x, 0.3 m")
+    assert study("aoa", fewer).settings.layout.names == ("a1", "a2")
+
+
+def test_what_a_search_wrote_becomes_the_plan(study):
+    table = with_found(
+        "turntable", (FOLDER / "gyro.toml").read_text(), "phi1 [deg],phi2 [deg]\n0,90\n45,10\n"
+    )
+    assert lines_of(study("turntable", table)) == "0, 90\n45, 10"
+    found = '# found\n[plan]\nturns = [\n    ["x", "30 deg"],\n]\nrate = "2 deg/s"\n'
+    plan = study("selfcal", with_found("selfcal", (FOLDER / "selfcal.toml").read_text(), found)).settings.plan
+    np.testing.assert_allclose(np.degrees([plan.rate, plan.moves[0].angle]), [2.0, 30.0])
+    found = '[sensors.a1]\naxis = "+x"\nr = "10 mm"\n\n[sensors.a2]\naxis = "+z"\nr = "20 mm"\n'
+    layout = study("aoa", with_found("aoa", (FOLDER / "sting.toml").read_text(), found)).settings.layout
+    np.testing.assert_allclose(layout.r, [0.01, 0.02])
+
+
+def test_a_value_over_several_lines_is_changed_as_a_whole():
+    text = '[plan]\nturns = [\n    ["z", "1 deg"],  # a ] in a remark\n    ["x", "2 deg"],\n]\nrate = "1 deg/s"\n'
+    assert changed(text, "plan.turns", '[["y", "3 deg"]]').splitlines() == [
+        "[plan]", 'turns = [["y", "3 deg"]]', 'rate = "1 deg/s"',
+    ]  # fmt: skip
+    out = changed(text, "plan.turns", "")
+    assert [line for line in out.splitlines() if not line.startswith("#")] == ["[plan]", 'rate = "1 deg/s"']
+
+
+@pytest.mark.parametrize("kind", ["turntable", "selfcal", "aoa"])
+def test_scenes_move_as_the_course_does(kind, study):
+    shown = course(study(kind, (FOLDER / FILES[kind]).read_text()))
+    scenes = {"a": gimbals(shown), "b": sphere(shown)}
+    told = motion(shown, scenes)
+    assert len(told["words"]) == len(told["poses"]) == len(told["up"])
+    for trace, (body, points) in scenes["a"].moving.items():
+        drawn = scenes["a"].figure["data"][trace]
+        first = points @ shown.poses[0, body].T
+        np.testing.assert_allclose(
+            np.array([drawn["x"], drawn["y"], drawn["z"]], dtype=float), first.T, atol=2e-5
+        )
