@@ -18,7 +18,7 @@ TABLE = ic.study(
     instrument={"kind": "accelerometer", "unit": "g", "noise": "10 ug"},
     positions={"plan": "24-position"},
     analysis={"method": "sampled", "samples": 64, "outputs": ["ax", "ay"]},
-    design={"positions": 12, "candidates": {"grid": "45 deg"}},
+    design={"positions": 12, "candidates": {"phi1": 8, "phi2": 8}},
 )
 PLATFORM = read_study(
     "selfcal", FOLDER / "selfcal.toml", ["design.turns=2", 'design.angle="90 deg"', 'design.time="400 s"']
@@ -35,8 +35,8 @@ def found(study, work, executor):
     ("study", "work"),
     [
         (TABLE, turntable.sensitivity),
-        (TABLE, turntable.design),
-        (PLATFORM, selfcal.design),
+        pytest.param(TABLE, turntable.design, marks=pytest.mark.campaign),
+        pytest.param(PLATFORM, selfcal.design, marks=pytest.mark.campaign),
     ],
     ids=["sensitivity", "positions", "selfcal"],
 )

@@ -57,6 +57,13 @@ class Clicks:
         self.page.click(selector)
 
 
+def usable(page):
+    """Wait until the study can be used; else the words that say why not."""
+    from playwright.sync_api import expect
+
+    expect(page.locator("[data-verdict]")).to_have_text("The study can be used.", timeout=60_000)
+
+
 EXPECTED = {"mpu6050": "ill_conditioned"}
 """Verdict of an example, where it is not ok."""
 
@@ -87,7 +94,7 @@ def test_from_a_dropped_log_to_a_certificate(chromium, bench, log, tmp_path):
         field = page.get_by_label(name, exact=True)
         field.fill(value)
         field.press("Tab")
-    page.wait_for_selector("text=The study can be used.")
+    usable(page)
     click('button:has-text("Run")')
     page.wait_for_url("**/result", timeout=120_000)
     page.wait_for_selector("[data-verdict]")
@@ -119,7 +126,7 @@ def test_an_example_comes_to_its_report(chromium, bench, name):
     page.click(f'button[aria-label="open example {name}"]')
     page.wait_for_selector("[data-findings]")
     page.click("text=Study")
-    page.wait_for_selector("text=The study can be used.")
+    usable(page)
     page.click('button:has-text("Run")')
     page.wait_for_url("**/result", timeout=180_000)
     assert page.inner_text("[data-verdict]").startswith(EXPECTED.get(name, "ok"))
@@ -209,7 +216,7 @@ def test_the_way_to_a_run_needs_no_mouse(chromium, bench):
     page.wait_for_selector("[data-findings]")
     page.locator('nav[aria-label="steps"] a:has-text("Study")').focus()
     page.keyboard.press("Enter")
-    page.wait_for_selector("text=The study can be used.")
+    usable(page)
     page.locator('button:has-text("Run")').focus()
     page.keyboard.press("Enter")
     page.wait_for_url("**/run")

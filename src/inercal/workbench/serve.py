@@ -50,8 +50,9 @@ def application(bench: Bench, key: Key, names: frozenset[str]) -> Any:
     app.mount("/static", StaticFiles(directory=Path(__file__).parent / "static"))
     add_pages(bench)
     ui.run_with(
-        app, title="inercal workbench", dark=None, show_welcome_message=False, favicon=_ICON, language="en-US"
-    )
+        app, title="inercal workbench", dark=None, show_welcome_message=False, favicon=_ICON, language="en-US",
+        reconnect_timeout=60.0,  # a machine that is busy keeps the page, and what was being typed on it
+    )  # fmt: skip
     return Guard(app, key, names)
 
 
