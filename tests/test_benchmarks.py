@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from inercal.estimate import runs
+from inercal.estimate import executors
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "benchmarks"
@@ -147,7 +147,7 @@ def test_no_other_speed_is_claimed():
 )
 def test_a_short_campaign(command, says, capsys, monkeypatch):
     script, *arguments = command.split()
-    monkeypatch.setattr(runs, "Processes", lambda workers: runs.Serial())
+    monkeypatch.setattr(executors, "Processes", lambda workers: executors.Serial())
     monkeypatch.setattr(sys, "argv", [script, *arguments])
     runpy.run_path(str(FOLDER / f"{script}.py"), run_name="__main__")
     assert says in capsys.readouterr().out

@@ -12,8 +12,8 @@ from inercal.cli.options import (
     ClusterOption,
     Overrides,
     ResultOutput,
-    SearchersOption,
     Study,
+    WorkersOption,
     place_of,
     reading,
     study_in,
@@ -30,7 +30,7 @@ def design_positions(
     study: Study,
     /,
     *,
-    workers: SearchersOption = None,
+    workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
@@ -78,7 +78,7 @@ def design_selfcal(
     study: Study,
     /,
     *,
-    workers: SearchersOption = None,
+    workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
@@ -177,7 +177,7 @@ def sensitivity(
     study: Study,
     /,
     *,
-    workers: SearchersOption = None,
+    workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)

@@ -298,11 +298,10 @@ def _last_words(path: Path, text: str) -> None:
 
 WorkersOption = Annotated[
     int | None,
-    Parameter(converter=whole_number, help="Processes at work; one for each processor if absent."),
-]
-SearchersOption = Annotated[
-    int | None,
-    Parameter(converter=whole_number, help="Processes at work; this one alone if absent."),
+    Parameter(
+        converter=whole_number,
+        help="Processes at work. If absent, a search has one, many runs or units one for each processor.",
+    ),
 ]
 ClusterOption = Annotated[
     str | None,
