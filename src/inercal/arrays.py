@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
+from functools import wraps
 from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 """Numbers in SI and radians; batch axes lead, vector axes trail."""
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 
@@ -20,6 +23,20 @@ def short_repr(cls: type[T]) -> type[T]:
     """Give a dataclass a `repr` of ten lines at most, with the sizes of what is too long to stand there."""
     cls.__repr__ = _outline  # type: ignore[method-assign]
     return cls
+
+
+def remembered(function: Callable[[K], T]) -> Callable[[K], T]:
+    """The function, which computes once for each argument, as long as that lives: what it gives is not to be changed
+    in place."""
+    known: WeakKeyDictionary[K, T] = WeakKeyDictionary()
+
+    @wraps(function)
+    def of(argument: K) -> T:
+        if argument not in known:
+            known[argument] = function(argument)
+        return known[argument]
+
+    return of
 
 
 def _outline(self: object) -> str:

@@ -38,6 +38,10 @@ _SIDEWAYS = 1e-12
 """Part of the stream across y below which there is no angle of attack."""
 
 
+_PART = 100_000
+"""Angles that are looked at at a time."""
+
+
 @dataclass(frozen=True, eq=False)
 class InStream:
     """``alpha``, ``beta`` and their standard uncertainties [rad], (n,) each."""
@@ -170,9 +174,15 @@ class Angles:
 
 def continuous(theta: Array) -> Array:
     """Angles (n,) [rad] without jumps of a turn, NaN where there is none."""
-    unwrapped, finite = theta.copy(), np.isfinite(theta)
-    unwrapped[finite] = np.unwrap(theta[finite])
-    return unwrapped
+    smooth, finite = theta.copy(), np.isfinite(theta)
+    smooth[finite] = np.unwrap(theta[finite])
+    return smooth
+
+
+def unwrapped(theta: Array) -> Array:
+    """Angles (n,) [rad] without jumps of a turn; the same array where there is no jump."""
+    parts = (theta[k : k + _PART + 1] for k in range(0, len(theta), _PART))
+    return theta if all(bool((np.abs(np.diff(part)) < math.pi).all()) for part in parts) else np.unwrap(theta)
 
 
 def stated_roll(angles: Angles, attitude: Attitude) -> Angles:

@@ -141,7 +141,9 @@ class Calibration:
     def measured(self, indication: Array, temperature: Array | float | None = None) -> Array:
         """Measured values [SI] of indications (n,); at its own temperature without ``temperature`` [degC]."""
         scale, bias = self._at(temperature)
-        return np.asarray(indication * scale - bias)
+        measured = np.asarray(indication * scale)
+        measured -= bias
+        return measured
 
     def indicated(self, value: Array, temperature: Array | float | None = None) -> Array:
         """Indications, in SI, volts or counts, of measured values: the inverse of `measured`."""

@@ -30,10 +30,10 @@ from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.delay import Delay, relative_delay
-from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.clock import in_time, later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior, Resonance
-from inercal.arrays import Array
+from inercal.arrays import Array, remembered
 from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
@@ -59,7 +59,7 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
 
     Looked at are the liveliest stretches of `Limits.snap_time`. Where no band fits there is none, and the usual snap.
     """
-    settings = limiting.with_rate(settings, recording.t[later(recording.t)])
+    settings = limiting.with_rate(settings, recording.t[in_time(recording.t)])
     stated = settings.band.low_pass is not None
     if stated and settings.estimator.snap is not None:
         return settings
@@ -254,7 +254,7 @@ def _with_offsets(recording: Recording, settings: AoaSettings) -> AoaSettings:
 def _vibration(recording: Recording) -> float:
     """Mean square [m^2/s^4] above `Limits.lowest_line` in the liveliest stretch, of the accelerometer that feels most;
     0 of a short recording."""
-    rows = next(_liveliest(recording), None)
+    rows = next(iter(_liveliest(recording)), None)
     if rows is None:
         return 0.0
     frequency, density = powers(recording.t[rows], recording.acc[rows])
@@ -337,16 +337,16 @@ def _bands(part: Recording, settings: AoaSettings) -> Iterator[Band]:
             yield band
 
 
-def _liveliest(recording: Recording) -> Iterator[NDArray[np.int64]]:
+@remembered
+def _liveliest(recording: Recording) -> tuple[NDArray[np.int64], ...]:
     """Rows of the stretches in which readings differ most from one row to the next, the liveliest first."""
-    taken = later(recording.t)
-    number = np.floor((recording.t[taken] - recording.t[taken[:1]]) / LIMITS.snap_time)
+    taken, t = later(recording.t), recording.t[in_time(recording.t)]
+    number = np.floor((t - t[:1]) / LIMITS.snap_time)
     stretches = [
         rows for rows in np.split(taken, np.flatnonzero(np.diff(number)) + 1) if _enough(recording, rows)
     ]
     sizes = [_restless(recording, rows) for rows in stretches]
-    for k in np.argsort(sizes)[::-1][: LIMITS.snap_stretches]:
-        yield stretches[k]
+    return tuple(stretches[k].copy() for k in np.argsort(sizes)[::-1][: LIMITS.snap_stretches])
 
 
 def _enough(recording: Recording, rows: NDArray[np.int64]) -> bool:
@@ -383,7 +383,7 @@ def _nis(of: FilterProblem, part: Recording) -> float:
 
 def _still(recording: Recording, settings: AoaSettings) -> float:
     """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
-    step = float(np.median(np.diff(recording.t[later(recording.t)])))
+    step = recording.interval
     lasting = max(2.0 * LIMITS.settling_time, min(LIMITS.snap_time, LIMITS.still_rows * step))
     t = step * np.arange(round(lasting / step), dtype=float)
     layout, rng = settings.layout, np.random.default_rng(0)

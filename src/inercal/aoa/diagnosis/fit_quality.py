@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +12,10 @@ from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import State, advance, initial
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.clock import in_time, later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, States
-from inercal.arrays import Array
+from inercal.arrays import Array, remembered
 from inercal.records.checks.values import outlying
 
 _BLOCK = 50
@@ -79,14 +80,16 @@ def _logarithm(v: Array) -> float:
         return float(np.minimum(np.log1p(v**2), 700.0).mean()) if v.size else 0.0
 
 
+@remembered
 def stretch(recording: Recording) -> Recording:
     """The rows in which the sensors vary most, later ones only, without single wild samples."""
     taken, most = later(recording.t), LIMITS.judged_rows
     if len(taken) > most:
-        read = np.column_stack([recording.acc, recording.gyro])[taken]
+        rows = in_time(recording.t)
+        read = [column[rows] for column in (*recording.acc.T, recording.gyro)]
         scale = _scatter(read)
         starts = np.arange(0, len(taken) - most + 1, most // 2)
-        lively = [float((_scatter(read[k : k + most]) / scale).sum()) for k in starts]
+        lively = [float((_scatter([c[k : k + most] for c in read]) / scale).sum()) for k in starts]
         first = int(starts[int(np.argmax(lively))])
         taken = taken[first : first + most]
     part = recording.of(taken)
@@ -97,11 +100,17 @@ def stretch(recording: Recording) -> Recording:
     return part
 
 
-def _scatter(read: Array) -> Array:
+def _scatter(read: Sequence[Array]) -> Array:
     """Standard deviation of each column, 1 for an empty one."""
-    finite = np.isfinite(read)
-    each = [float(c[k].std()) if k.any() else 0.0 for c, k in zip(read.T, finite.T, strict=True)]
-    return np.array([one or 1.0 for one in each])
+    return np.array([_deviation(column) or 1.0 for column in read])
+
+
+def _deviation(x: Array) -> float:
+    """Standard deviation of the numbers in ``x`` (n,), 0 without any."""
+    finite = np.isfinite(x)
+    if finite.all():
+        return float(x.std())
+    return float(x[finite].std()) if finite.any() else 0.0
 
 
 def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19) -> FitQuality:

@@ -155,7 +155,7 @@ def _estimate(
     settled = int(np.argmax(t - t[:1] >= min(LIMITS.settling_time, (t[-1] - t[0]) / 2.0))) if len(t) else 0
     # column by column, which is a few copies of one and not of all
     squared = [_without_spikes(each[settled:], problem.constants.gate) for each in innovations.T]
-    count = sum(map(len, squared))
+    power, count = sum(each for each, _ in squared), sum(each for _, each in squared)
     motion = angles
     if not whole:
         motion, innovations = _at(taken, len(recording.t), angles), _at(taken, len(recording.t), innovations)
@@ -172,7 +172,7 @@ def _estimate(
         states=kept[:, :m],
         states_u=kept[:, m:],
         state=state,
-        nis_mean=float(sum(map(np.sum, squared))) / count if count else float("nan"),
+        nis_mean=power / count if count else float("nan"),
         nis_count=count,
         starts=tuple(int(taken[each.row]) for each in trace.starts),
         smoothed=smoothed,
@@ -189,13 +189,15 @@ def _at(taken: NDArray[np.int64], n: int, values: Array) -> Array:
     return out
 
 
-def _without_spikes(innovations: Array, gate: float) -> Array:
-    """Squared innovations (n,), of single spikes as far as the gate lets them: they say nothing against the rest."""
+def _without_spikes(innovations: Array, gate: float) -> tuple[float, int]:
+    """Sum and number of squared innovations (n,), of single spikes as far as the gate lets them: they say nothing
+    against the rest."""
     with np.errstate(invalid="ignore"):
         squared = np.square(innovations)
         beyond = np.pad(squared > gate, 1)
     squared[beyond[1:-1] & ~beyond[:-2] & ~beyond[2:]] = gate
-    return np.asarray(squared[np.isfinite(squared)])
+    finite = np.isfinite(squared)
+    return float(np.sum(squared if finite.all() else squared[finite])), int(finite.sum())
 
 
 def roll_of(problem: FilterProblem, kept: Array) -> Array:

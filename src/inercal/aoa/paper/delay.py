@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.aoa.layout import Layout, all_weights, centrifugal_arms
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.clock import later, shortened, usual_step
+from inercal.aoa.reading.clock import in_time, later, shortened, usual_step
 from inercal.aoa.reading.recording import Recording
 from inercal.arrays import Array
 
@@ -72,34 +72,36 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     filter in one of them, counts as delay. Raises `RecordError` where time does not go on.
     """
     weights = all_weights(layout)
-    taken = later(recording.t)
-    if weights is None or len(taken) < 2 or any(each.code == "other_clock" for each in recording.findings):
+    taken = in_time(recording.t)
+    if (
+        weights is None
+        or len(recording.t[taken]) < 2
+        or any(each.code == "other_clock" for each in recording.findings)
+    ):
         return None
     t, gyro = recording.t[taken], recording.gyro[taken]
     used = np.flatnonzero(weights)
-    shown = recording.acc[np.ix_(taken, used)] @ weights[used]
-    shown = shown + float(weights @ centrifugal_arms(layout)) * gyro**2
+    shown = recording.acc[taken][:, used] @ weights[used]
+    shown += float(weights @ centrifugal_arms(layout)) * gyro**2
     if min(np.isfinite(shown).sum(), np.isfinite(gyro).sum()) < 2:
         return None
     # within a gap nothing counts, and beside it nothing of its other side
     bridged = LIMITS.bridged_samples
-    t = shortened(t, LIMITS.longest_delay + 2 * (bridged + 1) * float(np.median(np.diff(t))))
+    t = shortened(t, LIMITS.longest_delay + 2 * (bridged + 1) * recording.interval)
     step = usual_step(t)
     grid = np.arange(t[0], t[-1] + 0.5 * step, step)
-    missing = np.interp(grid, t, (np.isnan(shown) | np.isnan(gyro)).astype(float)) > 0.5
-    missing |= np.diff(t, append=np.inf)[np.searchsorted(t, grid, side="right") - 1] > bridged * step
-    missing = np.convolve(missing, np.ones(bridged + 1), "same") > bridged + 0.5
-    shown, gyro = (np.interp(grid, t[k], x[k]) for x, k in ((x, np.isfinite(x)) for x in (shown, gyro)))
+    missing = _missing(grid, t, np.isnan(shown) | np.isnan(gyro), step)
+    shown, gyro = (_bridged(grid, t, x) for x in (shown, gyro))
     size = round(min(max((t[-1] - t[0]) / _SEGMENTS, _SHORTEST), _LONGEST) / step)
     if not 2 <= size <= len(grid):
         return None
     tau, delay = 0.0, None
     for _ in range(_ROUNDS):
         # beside a line of the spectrum the phase is that of the line: only where all is aligned is it the right one
-        moved = _interpolated(grid, gyro, grid + tau)
-        if not np.isfinite(moved).any():
+        moved = gyro if tau == 0.0 else _moved(gyro, tau / step)
+        if moved is None:
             return None
-        turned = np.gradient(_bridged(grid, moved), step)
+        turned = np.gradient(moved, step)
         delay = _most_likely(*_spectra(shown, turned, missing, size), 1.0 / (size * step))
         if delay is None:
             return None
@@ -109,10 +111,49 @@ def relative_delay(recording: Recording, layout: Layout) -> Delay | None:
     return None if delay is None else replace(delay, value=tau)
 
 
-def _bridged(t: Array, values: Array) -> Array:
-    """Values with straight lines where they are missing."""
+def _bridged(grid: Array, t: Array, values: Array) -> Array:
+    """Values (n,) at ``t`` (n,) on a grid, with straight lines where they are missing."""
     finite = np.isfinite(values)
-    return np.interp(t, t[finite], values[finite])
+    return np.interp(grid, t, values) if finite.all() else np.interp(grid, t[finite], values[finite])
+
+
+def _missing(grid: Array, t: Array, lost: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
+    """Points of a grid in stretches of more than `Limits.bridged_samples` whose samples are ``lost`` (n,), or in a gap
+    of ``t`` (n,) [s]."""
+    bridged = LIMITS.bridged_samples
+    long = np.diff(t) > bridged * step
+    if not (lost.any() or long.any()):
+        return np.zeros(len(grid), dtype=bool)
+    missing = np.interp(grid, t, lost.astype(float)) > 0.5
+    missing |= np.append(long, True)[np.searchsorted(t, grid, side="right") - 1]
+    return np.asarray(np.convolve(missing, np.ones(bridged + 1), "same") > bridged + 0.5)
+
+
+def _moved(values: Array, steps: float) -> Array | None:
+    """What even samples (n,) are so many ``steps`` later, by Lagrange's cubic through the two on either side.
+
+    A straight line in the first and last interval, constant beyond them; None where nothing is left.
+    """
+    n, whole = len(values), math.floor(steps)
+    s = steps - whole
+    first, last = max(0, -whole), min(n - 1, n - 1 - whole - (s > 0.0))
+    if first > last:
+        return None
+    row, moved, low = np.arange(n), np.empty(n), max(0, 1 - whole)
+    high = max(low, min(n, n - 2 - whole))
+    for ends in (slice(0, low), slice(high, n)):
+        moved[ends] = np.interp(np.clip(row[ends], first, last) + steps, row, values)
+    if high > low:
+        weights = (
+            -s * (s - 1.0) * (s - 2.0) / 6.0,
+            (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
+            -(s + 1.0) * s * (s - 2.0) / 2.0,
+            (s + 1.0) * s * (s - 1.0) / 6.0,
+        )
+        moved[low:high] = 0.0
+        for k, weight in enumerate(weights, start=whole - 1):
+            moved[low:high] += weight * values[low + k : high + k]
+    return moved
 
 
 def _spectra(a: Array, b: Array, missing: NDArray[np.bool_], size: int) -> tuple[Array, Array, int]:

@@ -11,12 +11,17 @@ from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array
 from inercal.errors import RecordError
 
+_PART = 100_000
+"""Rows that are looked at at a time."""
+
 
 def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.int64]:
     """Rows of ``t`` (n,) [s] that are later than all before them and than ``last``.
 
     Raises `RecordError` where so many successive rows are not later that the clock was set back.
     """
+    if len(t) and t[0] > last and _goes_on(t):
+        return np.arange(len(t))
     before = np.maximum.accumulate(np.append(last, np.where(np.isnan(t), -np.inf, t)))
     taken = np.flatnonzero(t > before[:-1])
     left = np.diff(np.concatenate([[-1], taken, [len(t)]])) - 1
@@ -28,6 +33,17 @@ def later(t: Array, last: float = -math.inf, where: object = "t") -> NDArray[np.
             f"first at {t[row]:.10g} s, expected time to increase",
         )
     return taken
+
+
+def in_time(t: Array, where: object = "t") -> slice | NDArray[np.int64]:
+    """The rows of `later`, a slice where these are all: what it takes out of arrays are no copies then."""
+    return slice(None) if _goes_on(t) else later(t, where=where)
+
+
+def _goes_on(t: Array) -> bool:
+    """True where each stamp of ``t`` (n,) is later than that before it; looked at in parts, which takes no memory."""
+    parts = (t[k : k + _PART + 1] for k in range(0, len(t), _PART))
+    return bool(np.isfinite(t[:1]).all()) and all(bool((np.diff(part) > 0.0).all()) for part in parts)
 
 
 def set_back(where: object, late: int, last: float, t: float) -> RecordError:

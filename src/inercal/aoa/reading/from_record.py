@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from inercal.aoa.angles import continuous
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.clock import in_time, later
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
@@ -52,7 +52,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
             f"found {counted(len(taken), 'row')} that go on in time, expected {LIMITS.starting_rows} or more"
         )
         raise RecordError(where, text)
-    usable_interval(float(np.median(np.diff(t[taken]))), where)
+    usable_interval(float(np.median(np.diff(t[in_time(t, where)]))), where)
     rows = _Rows(record, settings, t, where)
     gyros = [name for name in GYROS if name in record and _speaks(record[name], settings)]
     values = {name: rows.calibrated(name) for name in (*there, *gyros)}
@@ -62,7 +62,8 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     masked = np.zeros((len(t), len(measured)), dtype=np.bool_)
     findings = [*_findings_of(record, lost), *_of_time(record, t, taken)]
     for name, (out, stuck) in lost.items():
-        on_rows = rows.on_rows(name, np.where(out | stuck, np.nan, values[name]))
+        left = out | stuck
+        on_rows = rows.on_rows(name, np.where(left, np.nan, values[name]) if left.any() else values[name])
         if name in measured and record[name].t is t:
             masked[:, measured.index(name)] = out
         values[name] = on_rows
@@ -167,7 +168,8 @@ def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tu
     out = np.zeros(len(read), dtype=np.bool_)
     out[saturated(read)] = True
     how = settings.calibration(name)
-    out |= at_range(indication(column, read), values[name], how)
+    if how.range is not None:
+        out |= at_range(indication(column, read), values[name], how)
     noise = settings.noise.gyro if name in GYROS else settings.noise.accelerometer
     others = [other for key, other in values.items() if key != name and len(other) == len(read)]
     stuck = _stuck(read, noise / abs(how.scale * column.unit.factor), others)
@@ -183,7 +185,7 @@ def _stuck(read: Array, noise: float, others: list[Array]) -> Flags:
     stuck = np.zeros(len(read), dtype=np.bool_)
     step = np.abs(np.diff(read))
     moving = step > 0.0
-    if not moving.any() or noise < step[moving].min():
+    if not noise >= step.min(initial=np.inf, where=moving):
         return stuck
     starts, ends = plateaus(step)
     long = ends - starts + 1 >= LIMITS.stuck_samples
@@ -282,7 +284,9 @@ def check_unit(column: Column, how: Calibration, where: object) -> None:
 
 def indication(column: Column, values: Array) -> Array:
     """``values`` (m,) of a column in SI, volts or counts."""
-    return values * column.unit.factor + column.unit.zero
+    indicated = values * column.unit.factor
+    indicated += column.unit.zero
+    return indicated
 
 
 def at_range(indicated: Array, measured: Array, how: Calibration) -> Flags:

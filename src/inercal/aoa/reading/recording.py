@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.reading.clock import in_time
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.inputs import Source
@@ -43,13 +46,19 @@ class Recording:
         """(n, N + 5) as `inercal.aoa.fusion.loop.advance` takes them."""
         return np.column_stack([self.acc, self.gyro, self.zero_angle, self.turns])
 
+    @cached_property
+    def interval(self) -> float:
+        """Median time [s] from one row to the next, of those that go on in time; NaN of fewer than two."""
+        t = self.t[in_time(self.t)]
+        return float(np.median(np.diff(t))) if len(t) > 1 else math.nan
+
     def of(self, rows: slice | NDArray[np.int64]) -> Recording:
         """These rows, less all that no filter takes."""
         return Recording(
             self.t[rows], self.acc[rows], self.gyro[rows], self.turns[rows], self.zero_angle[rows]
         )
 
-    @property
+    @cached_property
     def spatial(self) -> bool:
         """True where roll and yaw gyros are there."""
         return bool(np.isfinite(self.turns).all(axis=1).any())

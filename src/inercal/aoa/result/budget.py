@@ -87,7 +87,7 @@ def parts(
         recording, answered = limited, limited.t >= first
     taken = later(recording.t)
     taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
-    t, rows = recording.t[taken], recording.rows[taken]
+    t, rows = recording.t[taken], recording.of(taken).rows
     settled = answered[taken] & (t - t[:1] >= LIMITS.settling_time)
     judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())

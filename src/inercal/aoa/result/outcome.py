@@ -14,7 +14,7 @@ from inercal.aoa.angles import Angles
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.clock import later
+from inercal.aoa.reading.clock import in_time
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.reference.corrections import as_stated, report_of
 from inercal.aoa.result import verdict
@@ -207,11 +207,9 @@ def _of_sensors(settings: AoaSettings, verified: Verified | None) -> dict[str, A
 
 def _statistics(recording: Recording, angles: Angles) -> dict[str, float]:
     """Statistics of all methods."""
-    t = recording.t[later(recording.t)]
-    step = float(np.median(np.diff(t))) if len(t) > 1 else math.nan
     return {
         "samples": float(len(recording.t)),
-        "rate_hz": 1.0 / step,
+        "rate_hz": 1.0 / recording.interval,
         "angles": float(np.isfinite(angles.theta).sum()),
     }
 
@@ -220,7 +218,7 @@ def _basis(
     recording: Recording, settings: AoaSettings, angles: Angles, model: str, references: tuple[str, ...]
 ) -> Basis:
     """Basis of an estimate by any method."""
-    t = recording.t[later(recording.t)]
+    t = recording.t[in_time(recording.t)]
     rate = angles.rate[np.isfinite(angles.rate)]
     ranges = {
         "duration_s": float(t[-1] - t[0]) if len(t) else 0.0,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.angles import Angles, alpha_beta
+from inercal.aoa.angles import Angles, alpha_beta, unwrapped
 from inercal.aoa.reading.means import mean_u
 from inercal.aoa.reading.pauses import pauses
 from inercal.aoa.reading.recording import Recording
@@ -71,23 +71,28 @@ def points(recording: Recording, angles: Angles, settings: AoaSettings) -> tuple
     by = settings.points.by
     if by == "auto":
         by = "pause" if recording.point is None else "point"
-    answered = np.flatnonzero(np.isfinite(angles.theta) & np.isfinite(recording.t))
-    theta = np.unwrap(angles.theta[answered])
+    answered = np.isfinite(angles.theta) & np.isfinite(recording.t)
+    rows = slice(None) if answered.all() else np.flatnonzero(answered)
+    t, theta = recording.t[rows], unwrapped(angles.theta[rows])
     if by == "pause":
-        dwells = pauses(recording.t[answered], theta, angles.known_u[answered])
+        dwells = pauses(t, theta, angles.known_u[rows])
         stretches = [(float(k), each.start, each.stop) for k, each in enumerate(dwells, start=1)]
     else:
         column = recording.point if by == "point" else recording.trigger
         if column is None:
             raise RecordError(by, f'missing, expected the column that [points] by = "{by}" asks for')
-        numbers = column[answered]
-        stretches = (
-            _numbered(numbers)
-            if by == "point"
-            else triggered(recording.t[answered], numbers, settings.points)
-        )
+        numbers = column[rows]
+        stretches = _numbered(numbers) if by == "point" else triggered(t, numbers, settings.points)
     return tuple(
-        _point(number, answered[a:b], theta[a:b], recording, angles, settings) for number, a, b in stretches
+        _point(
+            number,
+            np.arange(a, b) if isinstance(rows, slice) else rows[a:b],
+            theta[a:b],
+            recording,
+            angles,
+            settings,
+        )
+        for number, a, b in stretches
     )
 
 

@@ -79,6 +79,8 @@ def is_covariance(P: Array) -> bool:
 
 def _lost(recording: Recording, filtered: FilterResult) -> str | None:
     """A sentence on a filter that lost the angle too often; None otherwise."""
+    if len(filtered.starts) <= LIMITS.losses:
+        return None
     seen = recording.t[np.isfinite(recording.acc).sum(axis=1) >= 2]
     starts = recording.t[list(filtered.starts[1:])]
     losses = starts[np.searchsorted(seen, starts - LIMITS.blind_time) < np.searchsorted(seen, starts)]

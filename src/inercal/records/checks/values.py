@@ -155,10 +155,12 @@ def saturated(values: Array) -> NDArray[np.int64]:
     if max(np.count_nonzero(signal == low), np.count_nonzero(signal == high)) < 3:
         return none
     step = np.diff(signal)
+    starts, ends = plateaus(step)
+    if starts.size == 0:
+        return none
     size = np.abs(step[step != 0])
     if size.size == 0 or high - low < 20 * size.min():
         return none
-    starts, ends = plateaus(step)
     before = np.where(starts > 0, np.abs(step[starts - 1]), np.inf)
     after = np.where(ends < step.size, np.abs(step[np.minimum(ends, step.size - 1)]), np.inf)
     sharp = np.minimum(before, after) > max(3 * size.min(), 0.02 * np.quantile(thinned(size), 0.99))
