@@ -86,7 +86,7 @@ def live(
 def _estimator(
     study: Path | None, calibration: Path | None, keys: list[str], interval: float
 ) -> Callable[[Say, SayFinding], Make]:
-    """What the study or the calibration asks for; raises `InputError` unless there is one of them."""
+    """The estimator that the study or the calibration asks for; raises `InputError` unless there is one of them."""
     if (study is None) == (calibration is None):
         found = "neither" if study is None else "both"
         raise InputError("--study, --apply", f"found {found}, expected one of them")

@@ -254,16 +254,6 @@ COMMANDS = {
         "goes on where it was stopped.",
         "inercal monitor log.csv --every '1 s'",
     ),
-    ("live", ""): (
-        "inercal.cli.live:live",
-        "Measure an instrument by wire: a serial port, UDP, TCP or MQTT, or a recording played again.\n\nText lines "
-        "or binary frames that the map describes, come in; what the kind of the study gives row by row goes out to "
-        "sinks: angles, coefficients, rest and noise, or with --apply corrected samples. A source that dies is "
-        "tried again; what is lost, out of order, late or dropped is counted and said. --record keeps the raw rows, of "
-        "which replay: gives the same digits. User and password of a broker are in INERCAL_MQTT_USER and "
-        "INERCAL_MQTT_PASSWORD, or in a file named by ?login=FILE. Ctrl-C ends it in order.",
-        "inercal live 'replay:model.csv?speed=0' --study aoa.toml --to text:angles.csv",
-    ),
     ("certificate", ""): (
         "inercal.cli.certificate:certificate",
         "Write a digital calibration certificate of results of one instrument, or read one.\n\nXML by PTB's schema DCC "

@@ -18,13 +18,15 @@ from typing import IO, TYPE_CHECKING, Any
 
 from inercal.errors import InercalError, InputError
 from inercal.findings import Finding
-from inercal.live.address import Replay, Sink, Source, sink_of, source_of
-from inercal.live.counts import Counts, SinkCounts, Spread, Stamps
+from inercal.live.address import Sink, Source, sink_of, source_of
+from inercal.live.counts import Counts, SinkCounts
 from inercal.live.feed import Feed
 from inercal.live.intake import Intake, is_datagrams, may_begin_within_a_row
-from inercal.live.sinks import Outlet, Row, new_file, quantities_of
-from inercal.stream.lines import Lines, Sample
-from inercal.stream.run import Output, Recursive, Saving, run
+from inercal.live.rows import Row, quantities_of
+from inercal.live.sinks import Outlet, new_file
+from inercal.live.watch import Quantity, Watch, Watched
+from inercal.stream.lines import Lines
+from inercal.stream.run import Output, Saving, run
 
 if TYPE_CHECKING:
     from inercal.live.estimators import Make, Say, SayFinding
@@ -35,15 +37,6 @@ KEPT, THIN = 6000, 0.02
 
 ALARMS = 200
 """Messages that are kept."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A value, its standard uncertainty where it has one, and the unit of both; None for what is not known."""
-
-    value: float | str | None
-    u: float | None
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -99,7 +92,7 @@ class Measurement:
         self._feed: Feed | None = None
         self._outlets: list[Outlet] = []
         self._stop = threading.Event()
-        self._watch = _Watch(self._stop, plan.source)
+        self._watch = Watch(self._stop, plan.source)
         self._alarms: deque[Alarm] = deque(maxlen=ALARMS)
         self._view: deque[tuple[float | str, ...]] = deque(maxlen=KEPT)
         self._given, self._thinned = 0, -math.inf
@@ -192,7 +185,7 @@ class Measurement:
         )
 
     def _sink_counts(self) -> dict[str, SinkCounts]:
-        """What became of the rows in each sink."""
+        """Rows written and dropped by each sink."""
         return {outlet.name: outlet.counts for outlet in self._outlets}
 
     @property
@@ -228,7 +221,7 @@ class Measurement:
             lines = Lines(feed, str(source), feed.record_map, self._found)  # type: ignore[arg-type]
             if not lines.stamped and feed.missing is None and is_datagrams(source):
                 self._said("rows have neither stamps nor a counter: what is lost cannot be seen")
-            estimator = _Watched(make(lines), self._watch, lines, feed)
+            estimator = Watched(make(lines), self._watch, lines, feed)
             self.columns = tuple(estimator.columns)
             self._outlets = [Outlet(sink, self.columns, self._print, self._said) for sink in plan.sinks]
             self.state = "running"
@@ -240,7 +233,7 @@ class Measurement:
         if self._intake.failure is not None:
             raise self._intake.failure
 
-    def _written(self, estimator: _Watched, feed: Feed) -> Callable[[str], None]:
+    def _written(self, estimator: Watched, feed: Feed) -> Callable[[str], None]:
         """A function that hands a line to all sinks and to the view; the first, the titles, they have already."""
         titles = iter([True])
 
@@ -291,87 +284,6 @@ class Measurement:
         """Keep a message."""
         with self._lock:
             self._alarms.append(alarm)
-
-
-class _Watch:
-    """What is seen of samples on their way: channels, stamps, times; those of a recording wait until they are due."""
-
-    def __init__(self, stop: threading.Event, source: Source) -> None:
-        self.stamps, self.times, self.rows = Stamps(), Spread(), 0
-        self.due = 0.0
-        self._replayed = isinstance(source, Replay)
-        self._speed = source.speed if isinstance(source, Replay) else 0.0
-        self._stop, self._origin = stop, math.nan
-        self._titles: list[tuple[str, str]] = []
-        self._sample: Sample | None = None
-
-    def describe(self, lines: Lines) -> None:
-        """Take the titles of the channels."""
-        self._titles = [(name, column.unit.symbol) for name, column in lines.record.columns.items()]
-
-    @property
-    def channels(self) -> dict[str, Quantity]:
-        """The last sample, by channel."""
-        sample = self._sample
-        if sample is None:
-            return {}
-        pairs = [(("t", "s"), sample.t), *zip(self._titles, sample.values, strict=True)]
-        return {
-            name: Quantity(value if math.isfinite(value) else None, None, unit)
-            for (name, unit), value in pairs
-        }
-
-    def take(self, sample: Sample, arrived: float) -> None:
-        """Look at a sample."""
-        if self._replayed:
-            self._wait(sample.t)
-        self.rows += 1
-        self.stamps.on(sample.t, None if self._replayed else arrived)
-        self._sample = sample
-
-    def _wait(self, t: float) -> None:
-        """Wait until the time of a sample has come, by the clock of the first one."""
-        if self._speed and math.isfinite(t):
-            now = time.perf_counter()
-            if math.isnan(self._origin):
-                self._origin = now - t / self._speed
-            if self._origin + t / self._speed > now:
-                self._stop.wait(self._origin + t / self._speed - now)
-        self.due = time.perf_counter()
-
-
-class _Watched:
-    """An estimator whose samples and rows are seen (`inercal.stream.run.Recursive`)."""
-
-    def __init__(self, inner: Recursive[Any], watch: _Watch, lines: Lines, feed: Feed) -> None:
-        self.inner, self._watch, self._feed = inner, watch, feed
-        self.kind, self.columns = inner.kind, inner.columns
-        self.given: deque[Output] = deque()
-        watch.describe(lines)
-
-    @property
-    def settings(self) -> object:
-        """Those of the estimator."""
-        return self.inner.settings
-
-    def initial(self) -> Any:
-        """The state before the first sample."""
-        return self.inner.initial()
-
-    def step(self, state: Any, sample: Sample) -> tuple[Any, Sequence[Output]]:
-        """The state after a sample, and its lines."""
-        self._watch.take(sample, self._feed.arrived)
-        before = time.perf_counter()
-        state, outputs = self.inner.step(state, sample)
-        self._watch.times.on(time.perf_counter() - before)
-        self.given.extend(outputs)
-        return state, outputs
-
-    def finish(self, state: Any) -> Sequence[Output]:
-        """The lines of rows that were held."""
-        outputs = self.inner.finish(state)
-        self.given.extend(outputs)
-        return outputs
 
 
 def measure(

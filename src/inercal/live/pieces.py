@@ -6,17 +6,15 @@ import io
 import re
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from inercal._files import replacing
 from inercal.errors import InputError, MissingExtraError
 from inercal.live.address import Pieces
+from inercal.live.rows import Row
 from inercal.records.titles import name_and_unit
-
-if TYPE_CHECKING:
-    from inercal.live.sinks import Row
 
 SPAN, MOST = 10.0, 100_000
 """A piece holds the rows of that time [s], at most so many."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import socket
@@ -11,14 +10,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from inercal.errors import InercalError, InputError
 from inercal.live.address import Mqtt, Pieces, Sink, Text, Udp
 from inercal.live.broker import Broker
 from inercal.live.counts import SinkCounts, Spread
 from inercal.live.pieces import PieceFiles
-from inercal.records.titles import name_and_unit
+from inercal.live.rows import Row, payload
 
 ROOM = 10_000
 """Rows that may wait for a sink."""
@@ -28,16 +27,8 @@ GOODBYE = 5.0
 """Time [s] that a sink is given at the end for what still waits."""
 
 
-class Row(NamedTuple):
-    """A row of an estimator: its line, its values (NaN and texts as they are), and when its sample came [s]."""
-
-    text: str
-    values: Sequence[float | str]
-    at: float
-
-
 class Writer(Protocol):
-    """Where the rows of a sink go; each method raises `OSError` or `InercalError` where it cannot go on."""
+    """The place where the rows of a sink go; each method raises `OSError` or `InercalError` where it cannot go on."""
 
     @property
     def held(self) -> int:
@@ -125,7 +116,7 @@ class Outlet:
 
     @property
     def counts(self) -> SinkCounts:
-        """What was written and dropped until now."""
+        """Rows written and dropped until now."""
         with self._change:
             return SinkCounts(
                 self._written,
@@ -336,28 +327,3 @@ class _Messages:
         """Leave the broker."""
         if self._broker is not None:
             self._broker.close()
-
-
-def payload(columns: Sequence[str], values: Sequence[float | str]) -> bytes:
-    """A row as JSON: by name its value, its standard uncertainty u where a column has it, and their unit."""
-    quantities = quantities_of(columns, values)
-    return json.dumps(quantities, separators=(",", ":"), ensure_ascii=False).encode()
-
-
-def quantities_of(
-    columns: Sequence[str], values: Sequence[float | str]
-) -> dict[str, dict[str, float | str | None]]:
-    """Value, u and unit of each quantity of a row, by name; None for a value that is not known."""
-    named = {
-        name: (value if isinstance(value, str) or math.isfinite(value) else None, unit or "1")
-        for (name, unit), value in zip(map(name_and_unit, columns), values, strict=True)
-    }
-    quantities: dict[str, dict[str, float | str | None]] = {}
-    for name, (value, unit) in named.items():
-        if name.startswith("u_") and name[2:] in named:
-            continue
-        quantity: dict[str, float | str | None] = {"value": value}
-        if f"u_{name}" in named:
-            quantity["u"] = named[f"u_{name}"][0]
-        quantities[name] = quantity | {"unit": unit}
-    return quantities

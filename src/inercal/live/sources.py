@@ -73,7 +73,7 @@ class _Serial:
             raise OSError(str(error)) from error
 
     def read(self) -> Piece:
-        """What is there, or the first byte that comes."""
+        """The bytes that are there, or the first that comes."""
         return Piece(self._port.read(min(max(1, self._port.in_waiting), PIECE)))
 
     def close(self) -> None:
@@ -136,7 +136,7 @@ class _Tcp:
         self._socket.settimeout(WAIT)
 
     def read(self) -> Piece:
-        """What has come."""
+        """The bytes that have come."""
         try:
             data = self._socket.recv(PIECE)
         except TimeoutError:

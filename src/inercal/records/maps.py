@@ -158,7 +158,7 @@ class FileEntry(Strict):
 
     @model_validator(mode="after")
     def _framed(self) -> FileEntry:
-        """What is said of frames fits together."""
+        """Keys of frames fit together."""
         own = {"check": self.check, "length": self.length, "counter": self.counter}
         if self.sync is None or self.binary is None:
             given = next((name for name, value in own.items() if value is not None), None)
