@@ -208,18 +208,27 @@ def _brought(client: Any, work: Any, address: str) -> str:
             if hasattr(self.work, "prepare"):
                 self.work.prepare()
 
-    try:
-        client.register_plugin(Work())
-    except Exception as error:  # what a worker raises comes in many classes
-        with suppress(Exception):
-            client.unregister_worker_plugin(name)
-        if isinstance(error, InercalError):
-            raise
-        if client.status != "running":
-            raise _lost(address) from error
-        raise InputError(
-            "--cluster",
-            f"{address}: a worker cannot begin ({' '.join(str(error).split())}), expected the modules of the work "
-            "in its PYTHONPATH",
-        ) from error
-    return name
+    for left in reversed(range(_AGAIN)):
+        try:
+            client.register_plugin(Work())
+            return name
+        except Exception as error:  # what a worker raises comes in many classes
+            with suppress(Exception):
+                client.unregister_worker_plugin(name)
+            if isinstance(error, InercalError):
+                raise
+            if left and client.status == "running" and isinstance(error, _distributed().comm.CommClosedError):
+                continue  # a worker was lost meanwhile
+            raise _unable(error, client, address) from error
+    raise AssertionError
+
+
+def _unable(error: Exception, client: Any, address: str) -> InercalError:
+    """The sentence for work that cannot be brought to the workers."""
+    if client.status != "running":
+        return _lost(address)
+    return InputError(
+        "--cluster",
+        f"{address}: a worker cannot begin ({' '.join(str(error).split())}), expected the modules of the work "
+        "in its PYTHONPATH",
+    )
