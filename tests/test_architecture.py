@@ -39,7 +39,7 @@ FLOORS = [
     {"laboratory"},
     {"validate"},
     {"face"},
-    {"fleet"},
+    {"fleet", "live"},
     {"cli", "workbench", "__main__"},
 ]
 SYSTEMS = {"imu", "strapdown", "turntable", "selfcal", "aoa"}

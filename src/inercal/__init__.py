@@ -77,6 +77,7 @@ Map, lower floors first; each imports only from those above its own line
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     face                       the verbs of Python, and the results that they give back
     fleet                      many units of one make: batch, capability, outliers
+    live                       an instrument by wire: sources, frames, sinks, a measurement that runs
     workbench                  the commands in a browser
     cli                        one module per verb
 """

@@ -13,14 +13,12 @@ from cyclopts import Parameter
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError, StudyError
+from inercal.errors import InputError
 
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings, Methods
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
-    from inercal.stream.aoa import Aoa
-    from inercal.stream.aoa_paper import PaperAoa
     from inercal.stream.lines import Lines
     from inercal.stream.run import Recursive
 
@@ -132,7 +130,7 @@ def aoa(
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
-        made: list[Aoa | PaperAoa] = []
+        made: list[Any] = []
         prepare = partial(_live, made, how)
         stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
         failure = made[-1].failure if made else ""
@@ -205,36 +203,19 @@ def _runs(
 
 
 def _live(
-    made: list[Aoa | PaperAoa],
+    made: list[Any],
     how: MethodOptions,
     settings: AoaSettings,
     interval: float,
     output: ResultOutput,
 ) -> Estimators:
     """Prepare a measurement row by row; ``made`` receives it."""
-    from inercal._jit import compiling
-    from inercal.aoa.fusion.live_band import load_kernels
-    from inercal.aoa.fusion.problem import problem
-    from inercal.stream.aoa import Aoa
-    from inercal.stream.aoa_paper import PaperAoa
+    from inercal.live.estimators import aoa as prepared
 
-    methods = how.methods(settings)
-    if methods is not None:
+    make = prepared(settings, interval, output.say, output.say_finding, how.methods(settings))
 
-        def by_paper(lines: Lines) -> Recursive[Any]:
-            made.append(PaperAoa(lines, settings, methods, interval, output.say_finding))
-            return made[-1]
+    def estimator(lines: Lines) -> Recursive[Any]:
+        made.append(make(lines))
+        return made[-1]  # type: ignore[no-any-return]
 
-        return by_paper
-    if settings.estimator.smooth:
-        raise StudyError(
-            "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
-        )
-    with compiling("aoa", output.say):
-        load_kernels(problem(settings))
-
-    def make(lines: Lines) -> Recursive[Any]:
-        made.append(Aoa(lines, settings, interval, output.say_finding))
-        return made[-1]
-
-    return make
+    return estimator

@@ -87,12 +87,9 @@ def calibrate_strapdown(
 
 def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) -> Estimators:
     """Prepare a calibration rest by rest."""
-    from inercal._jit import compiling
-    from inercal.stream.strapdown import Strapdown, load_kernels
+    from inercal.live.estimators import strapdown as prepared
 
-    with compiling("strapdown stream", output.say):
-        load_kernels(settings)
-    return lambda lines: Strapdown(lines, settings, output.say_finding)
+    return prepared(settings, output.say, output.say_finding)
 
 
 def calibrate_turntable(

@@ -93,12 +93,8 @@ def monitor(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Tell rest from motion, live, and measure the noise at rest."""
-    from inercal._jit import compiling
-    from inercal.noise.running import load_kernels
-    from inercal.stream.monitor import Monitor
+    from inercal.live.estimators import monitor as prepared
 
     interval = interval_of(every)
     streaming.check(output, (file, map_file))
-    with compiling("monitor", output.say):
-        load_kernels()
-    run_stream(lambda lines: Monitor(lines, interval), file, map_file, output, streaming)
+    run_stream(prepared(interval, output.say), file, map_file, output, streaming)

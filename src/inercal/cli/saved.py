@@ -53,7 +53,7 @@ def apply(
 
         file = streamed(files)
         streaming.check(output, (calibration, file, map_file))
-        model, findings, _ = _model(calibration, uncertainty)
+        model, findings, _ = usable(calibration, uncertainty)
         output.say_findings(findings)
         run_stream(
             lambda lines: Apply(lines, model, invert, output.say_finding), file, map_file, output, streaming
@@ -70,7 +70,7 @@ def apply(
     if output.out is None:
         raise InputError("--out", "missing, expected the file to write, such as corrected.csv")
     output.check(SUFFIXES, (calibration, *paths, map_file))
-    model, findings, estimate = _model(calibration, uncertainty)
+    model, findings, estimate = usable(calibration, uncertainty)
     record = apply_to(read_record(paths, map_file, output, span), model, invert)
     with reading(output) as progress:
         write_record(record, output.out, progress)
@@ -82,7 +82,7 @@ def apply(
     emit(without_coefficients("apply", words, result, inputs, findings), words, output)
 
 
-def _model(calibration: Path, uncertainty: bool) -> tuple[Model, tuple[Finding, ...], Estimate]:
+def usable(calibration: Path, uncertainty: bool = False) -> tuple[Model, tuple[Finding, ...], Estimate]:
     """The instrument of a calibration that was saved, what to say of that, and the calibration."""
     from inercal.convert.models import model_of, worth_knowing
     from inercal.face.calibrations import read_estimate

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,13 +12,12 @@ from cyclopts import Parameter
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError, StudyError
+from inercal.errors import InputError
 from inercal.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
     from inercal.selfcal.settings import SelfcalSettings
-    from inercal.stream.lines import Lines
 
 
 def selfcal(
@@ -91,36 +89,6 @@ def selfcal(
 
 def _live(settings: SelfcalSettings, interval: float, output: ResultOutput, until_goals: bool) -> Estimators:
     """Prepare a calibration row by row."""
-    from inercal._jit import compiling
-    from inercal.selfcal.filters.problem import problem
-    from inercal.selfcal.find_base import stated_well
-    from inercal.selfcal.reading import as_recorded
-    from inercal.selfcal.still_joints import without_fixed
-    from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
+    from inercal.live.estimators import selfcal as prepared
 
-    if settings.placed:
-        raise StudyError("records", "found records on bases of their own, expected one base for a stream")
-    stated_well(settings, "a stream")
-    settings, left_out = without_fixed(settings)
-    of = problem(settings)
-    filter_of(of)
-    goal = _goals(settings, of.names) if until_goals else {}
-    for finding in left_out:
-        output.say_finding(finding)
-    with compiling(f"selfcal stream {of.filter.kind}", output.say):
-        load_kernels(of)
-
-    def estimator(lines: Lines) -> Selfcal:
-        of_stream = as_recorded(lines.record, settings)
-        return Selfcal(lines, problem(of_stream), interval, output.say_finding, of_stream.fixed, goal)
-
-    return estimator
-
-
-def _goals(settings: SelfcalSettings, names: Sequence[str]) -> Mapping[str, float]:
-    """The goals of a study; raises `StudyError` where it has none, or one for what is no state."""
-    if not settings.goal:
-        raise StudyError("goal", "missing, expected wanted uncertainties with --until-goals")
-    if others := [name for name in settings.goal if name not in names]:
-        raise StudyError("goal", f"found {others[0]}, which is no state of the model, expected states alone")
-    return settings.goal
+    return prepared(settings, interval, output.say, output.say_finding, until_goals)

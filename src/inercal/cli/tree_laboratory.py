@@ -1,4 +1,4 @@
-"""The commands of the laboratory: entries of the tree."""
+"""The commands of the laboratory, of many units and of instruments by wire: entries of the tree."""
 
 #: as `inercal.cli.tree.COMMANDS`
 LABORATORY = {
@@ -81,6 +81,16 @@ LABORATORY = {
         "recordings. OUT gets units.csv, units.parquet, fleet.html, fleet.json and a result for each unit. A unit that "
         "fails is a row that says why; what is there already is not done again. Exit code 1: not all units are good.",
         "inercal batch fleet.csv --study imu.toml --out fleet",
+    ),
+    ("live", ""): (
+        "inercal.cli.live:live",
+        "Measure an instrument by wire: a serial port, UDP, TCP or MQTT, or a recording played again.\n\nText lines "
+        "or binary frames that the map describes, come in; what the kind of the study gives row by row goes out to "
+        "sinks: angles, coefficients, rest and noise, or with --apply corrected samples. A source that dies is "
+        "tried again; what is lost, out of order, late or dropped is counted and said. --record keeps the raw rows, of "
+        "which replay: gives the same digits. User and password of a broker are in INERCAL_MQTT_USER and "
+        "INERCAL_MQTT_PASSWORD, or in a file named by ?login=FILE. Ctrl-C ends it in order.",
+        "inercal live 'replay:model.csv?speed=0' --study aoa.toml --to text:angles.csv",
     ),
     ("workbench", ""): (
         "inercal.cli.workbench:workbench",

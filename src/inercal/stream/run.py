@@ -130,10 +130,12 @@ def _never(_: object) -> str:
 
 @dataclass(frozen=True)
 class Saving:
-    """File of the saved state, and rows from one save to the next."""
+    """File of the saved state, rows from one save to the next, and what is done before each: a writer that holds lines
+    back lets them go."""
 
     path: Path
     every: int
+    before: Callable[[], None] = lambda: None
 
 
 class _Position(NamedTuple):
@@ -218,6 +220,7 @@ def _run(
     def keep(least: int = 1) -> None:
         nonlocal saved
         if saving is not None and position.rows - saved >= least:
+            saving.before()
             save(saving.path, estimator.kind, mark, _Whole(position, state))
             saved = position.rows
 

@@ -12,6 +12,7 @@ import numpy as np
 from inercal.errors import RecordError
 from inercal.findings import Finding
 from inercal.records.channels import Channel
+from inercal.records.frames import Frame, Turns, frames_in
 from inercal.records.read.arrays import Contents, held, tables
 from inercal.records.read.limits import check_unpacked, unpacked
 from inercal.records.read.table import FileOptions, Table
@@ -23,7 +24,7 @@ def read(
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
 ) -> list[Table]:
-    """Read the wanted fields; bytes at the end that are no whole row are a finding.
+    """Read the wanted fields; bytes at the end that are no whole row are a finding, and those in no sound frame.
 
     Raises `RecordError` where there is no whole row.
     """
@@ -35,7 +36,10 @@ def read(
         except (OSError, EOFError, zlib.error) as error:
             raise RecordError(path, f"cannot be read as gzip ({error})") from error
         check_unpacked(path, len(raw), path.stat().st_size)
-    contents = contents_of(raw[options.skip :], options, path)
+    if options.frame is not None:
+        contents = contents_of_frames(raw[options.skip :], options.frame, channels or (), path)
+    else:
+        contents = contents_of(raw[options.skip :], options, path)
     progress(path.stat().st_size)
     return tables(contents, options, channels or (), path, mapped=True)
 
@@ -60,3 +64,35 @@ def contents_of(raw: bytes, options: FileOptions, path: Path) -> Contents:
     text = f"the file ends within a row: {rest} bytes left of a row of {row.itemsize}"
     findings = (Finding("truncated", text, f"row {rows + 1}"),) if rest else ()
     return Contents(columns, findings, tabular=True)
+
+
+def contents_of_frames(raw: bytes, frame: Frame, channels: tuple[Channel, ...], path: Path) -> Contents:
+    """The fields of frames as a table; stamps go on where their counter begins anew.
+
+    Raises `RecordError` where there is no frame.
+    """
+    found = frames_in(raw, frame)
+    if not len(found.rows):
+        raise RecordError(
+            path,
+            f"found no frame of {frame.size} bytes in {len(raw)} bytes ({found.damaged} with a wrong check), expected "
+            "frames as [file] has them",
+        )
+    columns = {name: np.ascontiguousarray(found.rows[name]) for name in frame.dtype.names or ()}
+    findings = []
+    if found.passed_over:
+        text = (
+            f"{found.passed_over} bytes are in no sound frame; the check of {found.damaged} frames is wrong"
+        )
+        findings.append(Finding("bad_row", text))
+    if frame.counter:
+        missing = Turns().on(columns[frame.counter])[0].missing
+        if missing:
+            findings.append(Finding("gap", f"{missing} frames are missing by their counter {frame.counter}"))
+    if rest := len(raw) - found.consumed:
+        text = f"the file ends within a frame: {rest} bytes left of a frame of {frame.size}"
+        findings.append(Finding("truncated", text, f"row {len(found.rows) + 1}"))
+    stamp = next((channel.origin for channel in channels if channel.name == "t"), None)
+    if stamp in columns and columns[stamp].dtype.kind == "u":
+        columns[stamp] = Turns().on(columns[stamp])[1]
+    return Contents({name: held(each) for name, each in columns.items()}, tuple(findings), tabular=True)

@@ -10,6 +10,7 @@ from typing import Protocol
 from inercal.arrays import Array
 from inercal.findings import Finding
 from inercal.records.channels import Channel
+from inercal.records.frames import Frame
 
 LARGEST = 1e30
 """Limit that no sensor reads in any unit: a larger value counts as missing, as infinity does, and powers of it do not
@@ -22,7 +23,8 @@ class FileOptions:
 
     ``delimiter`` " " is any run of blanks; ``comment`` begins lines to pass over (``#`` and ``%`` if None);
     ``skip`` counts lines before the header, or bytes of a binary file; ``variable`` is the array of a file that holds
-    several. ``transpose``: rows are channels. A raw ``binary`` file has a type of NumPy for each of its ``fields``.
+    several. ``transpose``: rows are channels. A raw ``binary`` file has a type of NumPy for each of its ``fields``, and
+    where its rows are frames, with sync bytes and check, a ``frame``.
     """
 
     delimiter: str | None = None
@@ -33,6 +35,7 @@ class FileOptions:
     transpose: bool = False
     binary: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
+    frame: Frame | None = None
 
 
 @dataclass(frozen=True)

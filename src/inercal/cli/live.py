@@ -1,0 +1,176 @@
+"""``inercal live``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from os.path import realpath
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from inercal.cli import EXIT_INTERRUPTED, abandon_output
+from inercal.cli.options import MapFile, Output, Overrides
+from inercal.cli.streaming import Every, StreamOptions, interval_of
+from inercal.errors import InercalError, InputError
+
+if TYPE_CHECKING:
+    from inercal.live.address import Sink
+    from inercal.live.estimators import Make, Say, SayFinding
+    from inercal.live.measurement import Measurement
+
+_EVERY = 30.0
+"""Time [s] from one line of counts to the next."""
+
+
+def live(
+    source: Annotated[
+        str,
+        Parameter(
+            help="Address: serial:DEVICE?baud=N, udp://HOST:PORT, tcp://HOST:PORT, mqtt://HOST/TOPIC, "
+            "mqtts://HOST/TOPIC or replay:FILE?speed=1 (0: as fast as it goes)."
+        ),
+    ],
+    /,
+    *,
+    study: Annotated[
+        Path | None,
+        Parameter(help="Study file (TOML) of kind aoa, selfcal, strapdown or imu (rest and noise)."),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        Parameter(name="--apply", help="Calibration to correct the samples with, in the place of a study."),
+    ] = None,
+    to: Annotated[
+        list[str] | None,
+        Parameter(
+            help="Sink: text:FILE, text:- (standard output, if none is given), parquet:FOLDER, hdf5:FOLDER, "
+            "udp://HOST:PORT, mqtt://HOST/TOPIC or mqtts://HOST/TOPIC. May be repeated."
+        ),
+    ] = None,
+    record: Annotated[Path | None, Parameter(help="New file that takes the raw rows, for replay:.")] = None,
+    every: Every = None,
+    map_file: MapFile = None,
+    overrides: Overrides = None,
+    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
+    output: Output = Output(),  # noqa: B008  (frozen)
+) -> int:
+    """Measure an instrument by wire."""
+    from inercal.live.address import sink_of, source_of
+    from inercal.live.measurement import Measurement, Plan
+    from inercal.stream.run import Saving
+
+    wire = source_of(source)
+    sinks = [sink_of(each) for each in to or ("text:-",)]
+    _check(wire_file := getattr(wire, "file", None), record, sinks)
+    streaming.check(output, (map_file, study, calibration, wire_file))
+    if streaming.after is not None:
+        raise InputError("--after", "found with a live source, expected it with a stream that begins anew")
+    record_map = None
+    if map_file is not None:
+        from inercal.records.maps import read_map
+
+        record_map = read_map(map_file)
+    saving = None
+    if streaming.checkpoint is not None:
+        saving = Saving(streaming.checkpoint, streaming.checkpoint_every)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
+    make = _estimator(study, calibration, overrides or [], interval_of(every))
+    plan = Plan(wire, make, record_map, record, sinks, saving)
+    return _followed(Measurement(plan, output.say, output.say_finding, _print), output)
+
+
+def _estimator(
+    study: Path | None, calibration: Path | None, keys: list[str], interval: float
+) -> Callable[[Say, SayFinding], Make]:
+    """The estimator that the study or the calibration asks for; raises `InputError` unless there is one of them."""
+    if (study is None) == (calibration is None):
+        found = "neither" if study is None else "both"
+        raise InputError("--study, --apply", f"found {found}, expected one of them")
+    if study is not None:
+        from inercal.face.study import kind_of, read_study
+
+        of = read_study(kind_of(study), study, keys)
+
+        def by_study(say: Say, say_finding: SayFinding) -> Make:
+            from inercal.live.estimators import of_study
+
+            return of_study(of, interval, say, say_finding)
+
+        return by_study
+    if keys or interval:
+        raise InputError("--set" if keys else "--every", "found with --apply, expected it with --study")
+    from inercal.cli.saved import usable
+
+    assert calibration is not None
+    model, findings, _ = usable(calibration)
+
+    def correcting(say: Say, say_finding: SayFinding) -> Make:
+        from inercal.stream.apply import Apply
+
+        for finding in findings:
+            say_finding(finding)
+        return lambda lines: Apply(lines, model, False, say_finding)
+
+    return correcting
+
+
+def _check(source: Path | None, record: Path | None, sinks: list[Sink]) -> None:
+    """Refuse one place for two things; raises `InputError`."""
+    files = [each for each in (source, record, *(_place(sink) for sink in sinks)) if each is not None]
+    names = [realpath(each) for each in files]
+    for place, name in zip(files, names, strict=True):
+        if names.count(name) > 1:
+            raise InputError(place, "found it for two things, expected a name for each")
+    if len(set(map(str, sinks))) < len(sinks):
+        raise InputError("--to", "found a sink twice, expected each once")
+
+
+def _place(sink: Sink) -> Path | None:
+    """The file or folder of a sink."""
+    place: Path | None = getattr(sink, "file", None) or getattr(sink, "folder", None)
+    return place
+
+
+def _followed(measurement: Measurement, output: Output) -> int:
+    """Run a measurement until it ends or is asked to, and say what became of its rows; the exit code."""
+    asked, due = False, time.monotonic() + _EVERY
+    measurement.start()
+    while True:
+        try:
+            if measurement.join(0.5):
+                break
+            if time.monotonic() >= due:
+                due += _EVERY
+                output.say(str(measurement.counts))
+        except KeyboardInterrupt:
+            if asked:  # a second one does not wait
+                raise
+            asked = True
+            measurement.stop()
+    if isinstance(measurement.error, InercalError):
+        if measurement.counts.rows:
+            output.say(str(measurement.counts))
+        raise measurement.error
+    if measurement.error is not None:
+        raise measurement.error
+    output.say(str(measurement.counts))
+    if measurement.verdict:
+        output.say(measurement.verdict)
+    if asked:
+        output.say("interrupted")
+        return EXIT_INTERRUPTED
+    return 1 if measurement.verdict or measurement.incomplete else 0
+
+
+def _print(text: str) -> None:
+    """Lines on standard output, at once."""
+    try:
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        abandon_output()
+        raise OSError("its reader has left") from None

@@ -1,0 +1,139 @@
+"""Honest counting: rows that are missing, out of order or late by their stamps, and how long rows take."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections import deque
+from dataclasses import dataclass
+
+_STEPS = 65
+_LATE = 0.25
+_MINUTE = 60.0
+_BINS_PER_OCTAVE, _OCTAVES, _LEAST = 8, 32, 1e-6
+
+
+@dataclass(frozen=True)
+class SinkCounts:
+    """Rows that a sink has ``written`` and ``dropped``, and the time [s] from sample in to row out there: its median
+    and the one that 99 of 100 rows keep within. ``failure`` says in words why it takes no more, if it does not."""
+
+    written: int
+    dropped: int
+    median: float
+    p99: float
+    failure: str
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Everything that came, and what became of it.
+
+    ``received`` bytes are ``used`` in rows, ``left_out`` (in no whole or sound row), ``dropped`` for want of room, or
+    still ``waiting``. Of ``rows``, ``lost`` are missing by their counter or their stamps, ``disordered`` came after a
+    later one, ``repeated`` have the stamp of another, ``late`` came 0.25 s later than the quickest of the last minute.
+    ``cut`` rows were begun or ended at a join, ``damaged`` frames have a wrong check. ``step_median`` and ``step_p99``
+    [s] are the estimator's own time for a row.
+    """
+
+    received: int
+    used: int
+    left_out: int
+    dropped: int
+    waiting: int
+    rows: int
+    lost: int
+    disordered: int
+    repeated: int
+    late: int
+    cut: int
+    damaged: int
+    datagrams_lost: int
+    reconnections: int
+    step_median: float
+    step_p99: float
+    sinks: dict[str, SinkCounts]
+
+    def __str__(self) -> str:
+        """One line for people."""
+        parts = [f"{self.rows} rows"]
+        named = {
+            "lost": self.lost, "out of order": self.disordered, "repeated": self.repeated, "late": self.late,
+            "cut at joins": self.cut, "frames damaged": self.damaged, "datagrams dropped by the system":
+            self.datagrams_lost, "bytes in no row": self.left_out, "bytes dropped": self.dropped,
+            "reconnections": self.reconnections,
+        }  # fmt: skip
+        parts += [f"{count} {name}" for name, count in named.items() if count]
+        for name, sink in self.sinks.items():
+            told = f"{name}: {sink.written} written"
+            told += f", {sink.dropped} dropped" if sink.dropped else ""
+            if sink.written and math.isfinite(sink.p99):
+                told += f", 99 % within {1e3 * sink.p99:.2g} ms"
+            parts.append(told)
+        if self.rows and math.isfinite(self.step_p99):
+            parts.append(f"a step {1e3 * self.step_median:.2g} ms, 99 % within {1e3 * self.step_p99:.2g} ms")
+        return "; ".join(parts)
+
+
+class Stamps:
+    """Judges rows by their stamps as they come."""
+
+    def __init__(self) -> None:
+        self.lost = self.disordered = self.repeated = self.late = 0
+        self._newest = -math.inf
+        self._steps: deque[float] = deque(maxlen=_STEPS)
+        self._interval, self._rows = math.nan, 0
+        self._least = [math.inf, math.inf]
+        self._since = math.nan
+
+    def on(self, t: float, arrived: float | None) -> None:
+        """Take a row's stamp [s], and when it came [s], None where that tells nothing, as in a recording."""
+        if not math.isfinite(t):
+            return
+        step = t - self._newest
+        if step == 0.0:
+            self.repeated += 1
+        elif step < 0.0:
+            self.disordered += 1
+            if self.lost and step > -_STEPS * self._interval:
+                self.lost -= 1  # it was not lost, only late
+        elif math.isfinite(step):
+            self._rows += 1
+            if step > 1.5 * self._interval:
+                self.lost += round(step / self._interval) - 1
+            self._steps.append(step)
+            if len(self._steps) == _STEPS and (self._rows % _STEPS == 0 or math.isnan(self._interval)):
+                self._interval = statistics.median(self._steps)
+        self._newest = max(self._newest, t)
+        if arrived is not None:
+            self._timed(arrived - t, arrived)
+
+    def _timed(self, delay: float, arrived: float) -> None:
+        """Compare a delay, but for a constant, with the least of the last minute or two: clocks drift."""
+        if not arrived - self._since < _MINUTE:
+            self._since, self._least = arrived, [self._least[1], math.inf]
+        self._least[1] = min(self._least[1], delay)
+        self.late += delay - min(self._least) > _LATE
+
+
+class Spread:
+    """Times in bins of an eighth of an octave: their quantiles in memory that does not grow."""
+
+    def __init__(self) -> None:
+        self._bins = [0] * (_BINS_PER_OCTAVE * _OCTAVES)
+        self._count = 0
+
+    def on(self, seconds: float) -> None:
+        """Take a time."""
+        place = int(_BINS_PER_OCTAVE * math.log2(max(seconds, _LEAST) / _LEAST))
+        self._bins[min(place, len(self._bins) - 1)] += 1
+        self._count += 1
+
+    def quantile(self, share: float) -> float:
+        """The time [s] within which that share of them lies, NaN of none."""
+        left = share * self._count
+        for place, count in enumerate(self._bins):
+            left -= count
+            if left <= 0.0 and self._count:
+                return _LEAST * math.exp2((place + 1) / _BINS_PER_OCTAVE)
+        return math.nan

@@ -1,0 +1,137 @@
+"""The estimator that a study asks for on a stream: the one of ``--stream`` and of live sources."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from inercal._jit import compiling
+from inercal.errors import StudyError
+from inercal.findings import Finding
+
+if TYPE_CHECKING:
+    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.face.study import Study
+    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.strapdown.settings import StrapdownSettings
+    from inercal.stream.lines import Lines
+    from inercal.stream.run import Recursive
+
+    Make = Callable[[Lines], Recursive[Any]]
+    """Makes the estimator for the columns of a stream."""
+
+Say = Callable[[str], None]
+SayFinding = Callable[[Finding], None]
+
+
+def of_study(study: Study, interval: float, say: Say, say_finding: SayFinding) -> Make:
+    """Prepare the estimator of a study, its kernels loaded, with a line each ``interval`` [s], 0 for each row.
+
+    A study of an IMU asks for its monitor: rest and noise. Raises `StudyError` where none works on a stream.
+    """
+    with study.at_fault():
+        match study.kind:
+            case "aoa":
+                make = aoa(study.settings, interval, say, say_finding)
+            case "selfcal":
+                make = selfcal(study.settings, interval, say, say_finding)
+            case "strapdown":
+                make = strapdown(study.settings, say, say_finding)
+            case "imu":
+                make = monitor(interval, say)
+            case _:
+                raise StudyError(
+                    study.path or "study",
+                    f"is of the kind {study.kind}, expected aoa, selfcal, strapdown or imu for a stream",
+                )
+
+    def of_columns(lines: Lines) -> Recursive[Any]:
+        with study.at_fault():
+            return make(lines)
+
+    return of_columns
+
+
+def aoa(
+    settings: AoaSettings,
+    interval: float,
+    say: Say,
+    say_finding: SayFinding,
+    methods: Methods | None = None,
+) -> Make:
+    """Prepare a measurement of angles; by the paper's ``methods``, or the fusion. Raises `StudyError`."""
+    from inercal.aoa.fusion.live_band import load_kernels
+    from inercal.aoa.fusion.problem import problem
+    from inercal.stream.aoa import Aoa
+    from inercal.stream.aoa_paper import PaperAoa
+
+    if methods is not None:
+        return lambda lines: PaperAoa(lines, settings, methods, interval, say_finding)
+    if settings.estimator.smooth:
+        raise StudyError(
+            "estimator.smooth", "found true with a stream, expected false: it knows the past alone"
+        )
+    with compiling("aoa", say):
+        load_kernels(problem(settings))
+    return lambda lines: Aoa(lines, settings, interval, say_finding)
+
+
+def selfcal(
+    settings: SelfcalSettings,
+    interval: float,
+    say: Say,
+    say_finding: SayFinding,
+    until_goals: bool = False,
+) -> Make:
+    """Prepare a calibration of a platform row by row, to its end or until the goals are met. Raises `StudyError`."""
+    from inercal.selfcal.filters.problem import problem
+    from inercal.selfcal.find_base import stated_well
+    from inercal.selfcal.reading import as_recorded
+    from inercal.selfcal.still_joints import without_fixed
+    from inercal.stream.selfcal import Selfcal, filter_of, load_kernels
+
+    if settings.placed:
+        raise StudyError("records", "found records on bases of their own, expected one base for a stream")
+    stated_well(settings, "a stream")
+    settings, left_out = without_fixed(settings)
+    of = problem(settings)
+    filter_of(of)
+    goal = _goals(settings, of.names) if until_goals else {}
+    for finding in left_out:
+        say_finding(finding)
+    with compiling(f"selfcal stream {of.filter.kind}", say):
+        load_kernels(of)
+
+    def estimator(lines: Lines) -> Selfcal:
+        of_stream = as_recorded(lines.record, settings)
+        return Selfcal(lines, problem(of_stream), interval, say_finding, of_stream.fixed, goal)
+
+    return estimator
+
+
+def _goals(settings: SelfcalSettings, names: Sequence[str]) -> Mapping[str, float]:
+    """The goals of a study; raises `StudyError` where it has none, or one for what is no state."""
+    if not settings.goal:
+        raise StudyError("goal", "missing, expected wanted uncertainties with --until-goals")
+    if others := [name for name in settings.goal if name not in names]:
+        raise StudyError("goal", f"found {others[0]}, which is no state of the model, expected states alone")
+    return settings.goal
+
+
+def strapdown(settings: StrapdownSettings, say: Say, say_finding: SayFinding) -> Make:
+    """Prepare a calibration of a strapdown unit rest by rest."""
+    from inercal.stream.strapdown import Strapdown, load_kernels
+
+    with compiling("strapdown stream", say):
+        load_kernels(settings)
+    return lambda lines: Strapdown(lines, settings, say_finding)
+
+
+def monitor(interval: float, say: Say) -> Make:
+    """Prepare a monitor of rest and noise."""
+    from inercal.noise.running import load_kernels
+    from inercal.stream.monitor import Monitor
+
+    with compiling("monitor", say):
+        load_kernels()
+    return lambda lines: Monitor(lines, interval)
