@@ -1,24 +1,22 @@
 """Are the stated uncertainties of an IMU's calibration true? Campaigns of simulated calibrations.
 
-    python benchmarks/imu_coverage.py --runs 2000 --folder build/coverage
+    python benchmarks/imu_coverage.py --runs 2000 --checkpoint build/coverage
     python benchmarks/imu_coverage.py --runs 2000 --method ferraris
 
-An interrupted campaign with a folder goes on where it stopped. The results are kept in docs/uncertainty/imu.md (by
+An interrupted campaign with --checkpoint goes on where it stopped. The results are kept in docs/uncertainty/imu.md (by
 hand) and docs/uncertainty/imu-methods.md (the other methods).
 """
 
 import argparse
 import os
-import sys
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from campaigns import aided, ferraris, rows
 from campaigns import imu as by_hand
+from campaigns.places import add_options, in_words, place_of, progress
 
 from inercal.estimate.coverage import coverage
-from inercal.estimate.executors import Processes
 from inercal.estimate.runs import run
 from inercal.imu.aided.coefficients import circumstances_of, names_of
 from inercal.imu.ferraris.method import NAMES
@@ -50,7 +48,6 @@ CAMPAIGNS = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=2000)
-    parser.add_argument("--folder", type=Path, help="keep finished chunks here")
     parser.add_argument("--method", choices=METHODS, default="multiposition")
     kind = parser.add_mutually_exclusive_group()
     kind.add_argument(
@@ -72,6 +69,7 @@ def main() -> None:
         choices=("drawn", "fitted"),
         help="multiposition: draw second-order coefficients, or draw and fit them",
     )
+    add_options(parser)
     options = parser.parse_args()
     if options.k2:
         options.kind = f", K2 {options.k2}"
@@ -84,14 +82,13 @@ def main() -> None:
         task,
         runs=options.runs,
         seed=SEED,
-        executor=Processes(os.cpu_count() or 1),
-        folder=options.folder,
-        progress=lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr, flush=True),
+        executor=place_of(options),
+        folder=options.checkpoint,
+        progress=progress,
     )
-    print(file=sys.stderr)
     print(f"sound: {int(sample['sound'].sum())} of {options.runs}")
     print(coverage(sample["error"], sample["u"], sample["dof"]).table(names))
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -1,22 +1,21 @@
 """Are the stated uncertainties of noise coefficients true? Campaigns of simulated recordings.
 
-    python benchmarks/noise_coverage.py --runs 2000
+    python benchmarks/noise_coverage.py --runs 2000 --checkpoint build/coverage-noise
 
 Its result is kept in docs/uncertainty/noise.md.
 """
 
 import argparse
 import os
-import sys
 from functools import partial
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from campaigns.noise import MIXES, one_recording
+from campaigns.places import add_options, in_words, place_of, progress
 from scipy import stats
 
-from inercal.estimate.executors import Processes
 from inercal.estimate.result import coverage_factor
 from inercal.estimate.runs import run
 from inercal.instruments.noise import SYMBOLS
@@ -38,6 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=SEED)
+    add_options(parser)
     options = parser.parse_args()
     runs = options.runs
 
@@ -49,10 +49,10 @@ def main() -> None:
             partial(one_recording, mix, lost),
             runs=runs,
             seed=options.seed,
-            executor=Processes(os.cpu_count() or 1),
-            progress=lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr, flush=True),
+            executor=place_of(options),
+            folder=options.checkpoint and options.checkpoint / f"{mix}-{lost:g}",
+            progress=progress,
         )
-        print(file=sys.stderr)
         name = f"{mix}, {100 * lost:.2g} % lost" if lost else mix
         for k, symbol in enumerate(SYMBOLS):
             print(f"{name + ' ' + symbol:24s}", figures(sample, k, getattr(MIXES[mix], symbol)))
@@ -78,4 +78,4 @@ def figures(sample: dict[str, np.ndarray], k: int, truth: float) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -2,19 +2,19 @@
 
     python benchmarks/selfcal_coverage.py --study STUDY.toml --runs 1000 --filter error-state
 
-Without a study it is the paper's (`inercal examples selfcal`). An interrupted campaign with --folder goes on where it
-stopped. Its results are kept in docs/uncertainty/self-calibration.md.
+Without a study it is the paper's (`inercal examples selfcal`). An interrupted campaign with --checkpoint goes on where
+it stopped. Its results are kept in docs/uncertainty/self-calibration.md.
 """
 
 import argparse
 import os
-import sys
 import time
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from inercal.estimate.executors import Threads
+from campaigns.places import add_options, in_words, place_of, progress
+
 from inercal.examples import FOLDER
 from inercal.selfcal.estimators import KINDS
 from inercal.selfcal.monte_carlo import campaign
@@ -29,7 +29,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--filter", choices=KINDS, default="error-state")
     parser.add_argument("--set", action="append", default=[], help="override one key of the study: key=value")
-    parser.add_argument("--folder", type=Path, help="keep finished chunks here")
+    add_options(parser)
     options = parser.parse_args()
 
     settings = load_selfcal_study(options.study or FOLDER / "selfcal.toml", options.set)
@@ -39,16 +39,13 @@ def main() -> None:
         options.runs,
         SEED,
         options.filter,
-        executor=Threads(os.cpu_count() or 1),
-        folder=options.folder,
-        progress=lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr, flush=True),
+        executor=place_of(options),
+        folder=options.checkpoint,
+        progress=progress,
     )
-    print(file=sys.stderr)
     print(found.table())
-    print(
-        f"{options.runs / (time.perf_counter() - began):.0f} runs/s on {os.cpu_count()} cores, simulation included"
-    )
+    print(f"{options.runs / (time.perf_counter() - began):.0f} runs/s, simulation included")
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -1,6 +1,6 @@
 """Errors of `calibrate strapdown` against its stated uncertainties at three grades.
 
-    python benchmarks/strapdown_coverage.py --runs 100
+    python benchmarks/strapdown_coverage.py --runs 100 --checkpoint build/coverage-strapdown
 
 Truth is drawn from the prior, runs are those of the program's own simulator, 19 positions at 100 Hz. Of the fit: NEES
 of 31 coefficients, coverage of 95 % intervals, scatter over bounds (geometric mean, least and largest coefficient),
@@ -12,69 +12,21 @@ docs/theory/strapdown.md, by hand.
 
 import argparse
 import os
-import sys
-from dataclasses import replace
-from pathlib import Path
+from collections import Counter
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "strapdown"))
 
 import numpy as np
-from grades import GRADES, drawn
-
-from inercal.estimate.result import Estimate
-from inercal.records.record import record_of
-from inercal.strapdown.coefficients import stated
-from inercal.strapdown.settings import ESTIMABLE, StrapdownSettings
-from inercal.strapdown.simulate import simulated
-from inercal.strapdown.task import calibrate
-from inercal.units import parse_unit
-
-UNITS = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
+from campaigns.places import add_options, answers, in_words
+from campaigns.strapdown import GRADES, Calibration, studies
 
 
-def studies(settings: StrapdownSettings) -> dict[str, StrapdownSettings]:
-    """The study, with the filter beside the batch; where biases walk without, and one that leaves walks and turns to
-    the recording."""
-    if not settings.noise.walks:
-        return {"stated": replace(settings, filter="error-state")}
-    noise = replace(settings.noise, gyro_walk=0.0, accelerometer_walk=0.0, estimate=ESTIMABLE)
-    return {"stated": settings, "estimated": replace(settings, noise=noise)}
-
-
-def apart(estimate: Estimate) -> float:
-    """Largest difference of filter and batch over u."""
-    batch, of_filter = (estimate.result["compare"][name] for name in ("batch", "error-state"))
-    return max(abs(of_filter[name]["value"] - each["value"]) / each["u"] for name, each in batch.items())
-
-
-def row(settings: StrapdownSettings, true: StrapdownSettings, runs: int, seed: int) -> str:
-    """Figures of a study on runs of another."""
-    z, z_stated, nees, squares, growth, differ, verdicts = [], [], [], [], [], [], {}
-    for number in range(runs):
-        rng = np.random.default_rng([seed, number])
-        c = drawn(true, rng)
-        samples = simulated(true, c, rng)
-        columns = [
-            (f"{sensor}_{axis}", UNITS[sensor], values[:, i])
-            for sensor, values in (("acc", samples.force), ("gyro", samples.rate))
-            for i, axis in enumerate("xyz")
-        ]
-        record = record_of(columns, samples.ts * np.arange(1, len(samples.rate) + 1))
-        made = calibrate(record, settings)
-        of, fit = made.estimate, made.fit
-        verdicts[of.status.value] = verdicts.get(of.status.value, 0) + 1
-        off = (fit.c - c)[fit.free]
-        z.append(off / np.sqrt(np.diag(fit.covariance)))
-        nees.append(off @ np.linalg.solve(fit.covariance, off))
-        squares.append(fit.chi2 / fit.dof)
-        u = np.array([of[name].u for name in of.names])
-        error = np.array([of[name].value for name in of.names]) - stated(c, true.terms, true.frame)
-        z_stated.append(error / u)
-        growth.append(u / np.array([of.result["bounds"][name] for name in of.names]))
-        if settings.filter == "error-state":
-            differ.append(apart(of))
-    z, z_stated, growth = np.array(z), np.array(z_stated), np.array(growth)
+def row(runs: list[dict]) -> str:
+    """Figures of runs of a study."""
+    z, z_stated, growth = (np.array([run[name] for run in runs]) for name in ("z", "z_stated", "growth"))
+    nees, squares = ([run[name] for run in runs] for name in ("nees", "square"))
+    differ = [each for run in runs for each in run["apart"]]
+    verdicts = Counter(run["verdict"] for run in runs)
     scatter = np.sqrt(np.mean(z**2, axis=0))
     cells = [
         f"{np.mean(nees):.1f}",
@@ -93,15 +45,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--seed", type=int, default=2101)
+    parser.add_argument("--grade", choices=tuple(GRADES), action="append", help="these alone")
+    add_options(parser)
     options = parser.parse_args()
     print(
         "| grade, noise | NEES | 95 % | scatter over bounds | chi-square | stated u | larger | filter | verdicts |"
     )
     print("|---|---|---|---|---|---|---|---|---|")
-    for grade, true in GRADES.items():
-        for name, settings in studies(true).items():
-            print(f"| {grade}, {name} | {row(settings, true, options.runs, options.seed)} |", flush=True)
+    for grade in options.grade or GRADES:
+        for study in studies(GRADES[grade]):
+            about = {"strapdown": grade, "study": study, "seed": options.seed}
+            runs = answers(Calibration(grade, study, options.seed), options.runs, options, about)
+            print(f"| {grade}, {study} | {row(runs)} |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -9,12 +9,13 @@ import re
 import runpy
 import sys
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
-from inercal.estimate import executors
+from inercal.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "benchmarks"
@@ -137,17 +138,20 @@ def test_no_other_speed_is_claimed():
         ("aoa_bands --seeds 1 --draws 4 --scenario base", "smoothed 19"),
         ("aoa_endless --rows 5000", " 0 without an angle"),
         ("aoa_hours --duration 70 --seeds 1", "then a polar"),
-        ("imu_coverage --runs 2", "all together"),
-        ("imu_coverage --runs 2 --method ferraris --by-scatter", "all together"),
-        ("imu_coverage --runs 2 --method aided", "all together"),
-        ("noise_coverage --runs 2", "weak K"),
-        ("selfcal_coverage --runs 4", "runs/s"),
-        ("turntable_coverage --runs 2", "all together"),
+        ("imu_coverage --runs 2 --workers 1", "all together"),
+        ("imu_coverage --runs 2 --workers 1 --method ferraris --by-scatter", "all together"),
+        ("imu_coverage --runs 2 --workers 1 --method aided", "all together"),
+        ("noise_coverage --runs 2 --workers 1", "weak K"),
+        ("selfcal_coverage --runs 4 --workers 1", "runs/s"),
+        ("selfcal_rig_coverage --runs 2 --workers 1", "largest error"),
+        pytest.param(
+            "strapdown_coverage --runs 2 --workers 1 --grade tactical", "| ok 2 |", marks=pytest.mark.campaign
+        ),
+        ("turntable_coverage --runs 2 --workers 1", "all together"),
     ],
 )
 def test_a_short_campaign(command, says, capsys, monkeypatch):
     script, *arguments = command.split()
-    monkeypatch.setattr(executors, "Processes", lambda workers: executors.Serial())
     monkeypatch.setattr(sys, "argv", [script, *arguments])
     runpy.run_path(str(FOLDER / f"{script}.py"), run_name="__main__")
     assert says in capsys.readouterr().out
@@ -165,39 +169,61 @@ def test_a_short_campaign_of_faults(capsys, monkeypatch):
 
 @pytest.mark.slow
 def test_a_stress_campaign_goes_on_where_it_stopped(tmp_path, capsys, monkeypatch):
-    """Kept in chunks, resumed, its runs that broke a law made again, in a table: as one undisturbed campaign."""
+    """Kept in chunks, resumed, chunks with a broken law made again, in a table: as one undisturbed campaign."""
     stress = importlib.import_module("stress")
     monkeypatch.setattr(stress, "CHUNK", 4)
     monkeypatch.setattr(stress.faulthandler, "enable", lambda: None)  # pytest has its own
 
     def told(*words):
         """The exit code and what is said."""
-        monkeypatch.setattr(sys, "argv", ["stress.py", *map(str, words)])
+        monkeypatch.setattr(sys, "argv", ["stress.py", *map(str, words), "--workers", "1"])
         with pytest.raises(SystemExit) as ended:
             stress.main()
         return ended.value.code, capsys.readouterr().out
 
-    files = [tmp_path / f"{system}.json" for system in stress.ROOMS]
-    for system, path in zip(stress.ROOMS, files, strict=True):
+    folders = [tmp_path / system for system in stress.ROOMS]
+    for system, folder in zip(stress.ROOMS, folders, strict=True):
         runs = 20 if system == "drift" else 8
         stress.load(system)
-        whole, _, _ = stress.campaign(system, range(runs))
-        assert told(system, "--runs", 4, "--keep", path)[0] == 0
-        assert json.loads(path.read_text())["runs"] == 4
-        assert told(system, "--runs", runs, "--keep", path)[0] == 0
-        state = json.loads(path.read_text())
-        assert (state["runs"], state["outcomes"], state["wrong"]) == (runs, whole, [])
+        numbers = range(runs)
+        whole, *_ = stress.campaign(numbers, [*map(stress.Absurd(system), numbers)])
+
+        def state(folder=folder):
+            found = json.loads((folder / "summary.json").read_text())
+            return found["runs"], Counter(found["outcomes"]), found["wrong"]
+
+        kept = ("--checkpoint", folder)
+        assert told(system, "--runs", 4, *kept)[0] == 0
+        first = folder / "runs-0-3.json"
+        before = first.stat().st_mtime_ns
+        assert told(system, "--runs", runs, *kept)[0] == 0
+        assert first.stat().st_mtime_ns == before
+        assert state() == (runs, whole, [])
         # a law that run 1 broke once
-        ended = stress.one(system, 1).outcome
-        outcomes = whole - Counter([ended]) + Counter(["failed"])
-        path.write_text(json.dumps(state | {"outcomes": outcomes, "wrong": [[1, "failed", "broken"]]}))
-        assert told(system, "--runs", runs, "--keep", path)[0] == 1
-        assert told(system, "--runs", runs, "--keep", path, "--again")[0] == 0
-        state = json.loads(path.read_text())
-        assert (state["runs"], state["outcomes"], state["wrong"]) == (runs, whole, [])
-        assert (
-            told(system, "--runs", runs, "--seed", 1, "--keep", path)[0] == f"{path} is of another campaign"
-        )
-    monkeypatch.setattr(sys, "argv", ["stress.py", "--table", *map(str, files)])
+        answers = json.loads(first.read_text())
+        answers[1][:2] = ["failed", ["broken"]]
+        first.write_text(json.dumps(answers))
+        assert told(system, "--runs", runs, *kept)[0] == 1
+        assert state()[2] == [[1, "failed", "broken"]]
+        assert told(system, "--runs", runs, *kept, "--again")[0] == 0
+        assert state() == (runs, whole, [])
+        monkeypatch.setattr(sys, "argv", ["stress.py", system, "--seed", "1", *map(str, kept)])
+        with pytest.raises(InputError, match="is of another campaign"):
+            stress.main()
+    monkeypatch.setattr(sys, "argv", ["stress.py", "--table", *map(str, folders)])
     stress.main()
     assert "| runs | 8 | 20 | 8 |\n| runs that broke a law | 0 | 0 | 0 |" in capsys.readouterr().out
+
+
+def test_a_run_without_end_is_ended_in_any_thread(monkeypatch):
+    """As on a cluster, whose workers compute in a thread beside their main one; the next run goes on as ever."""
+    runs = importlib.import_module("absurd.runs")
+    expected = runs.one("drift", 3)
+    with monkeypatch.context() as patch:
+        patch.setattr(runs, "LONGEST", 0.1)
+        patch.setattr("absurd.drift.run", lambda rng: [n for n in iter(int, 1) if n])
+        with ThreadPoolExecutor(1) as pool:
+            found = pool.submit(runs.one, "drift", 3).result()
+    assert found.outcome == "failed"
+    assert found.wrong[0].startswith("TooLongError: no end within 0.1 s")
+    assert runs.one("drift", 3).outcome == expected.outcome

@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from argparse import Namespace
 from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from independent.fleet import made
+from test_fleet import seconds, told
 
 import inercal as ic
 from inercal.errors import InercalError, InputError
@@ -75,6 +77,25 @@ def cluster(folder, workers=2, ttl="30s", failures="3"):
             each.wait()
 
 
+@contextmanager
+def worker_beside(file):
+    """One more worker at a scheduler."""
+    words = ["--scheduler-file", file, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", *words]
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        _wait_for(file, 3)
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
 def _wait_for(file, workers):
     from distributed import Client
 
@@ -104,6 +125,41 @@ def test_a_fleet_has_the_digits_of_one_process(quiet, tmp_path):
     one, many = ({path.name: coefficients(path) for path in out.glob("units/*.json")} for out in outs)
     assert one == many
     assert len(one) == 8
+
+
+class Unprepared:
+    """Work that its workers cannot make ready."""
+
+    def __call__(self, numbers):
+        return list(numbers)
+
+    def prepare(self):
+        raise OSError("no room\nfor kernels")
+
+
+@pytest.mark.slow
+def test_work_that_no_worker_can_begin_is_refused_and_leaves_nothing(quiet, expected):
+    with pytest.raises(InputError, match=r"a worker cannot begin \(.*no room for kernels") as caught:
+        list(Cluster(quiet).map(Unprepared(), [range(1)]))
+    assert "\n" not in str(caught.value)
+    with worker_beside(quiet):  # what could not begin is not asked of one that comes later
+        assert np.array_equal(
+            run(noise, runs=4, seed=SEED, executor=Cluster(quiet), chunk=1)["x"], expected[:4]
+        )
+
+
+@pytest.mark.slow
+def test_a_campaign_of_the_benchmarks_has_the_answers_of_one_process(quiet, tmp_path):
+    """Absurd runs, whose time is limited in a worker's thread too, kept and taken up again."""
+    from absurd.runs import Absurd
+    from campaigns.places import answers
+
+    def ended(cluster, workers=None):
+        given = Namespace(workers=workers, cluster=cluster, checkpoint=tmp_path / f"{cluster is None}")
+        return [each[:2] for each in answers(Absurd("drift"), 24, given, {"room": "drift"}, 4)]
+
+    assert ended(quiet) == ended(None, 1)
+    assert len({outcome for outcome, _ in ended(quiet)}) > 2  # from its checkpoint
 
 
 def coefficients(path):
@@ -200,3 +256,51 @@ def test_a_client_that_is_killed_goes_on_and_leaves_no_work(quiet, tmp_path):
         {path.name: coefficients(path) for path in at.glob("units/*.json")} for at in (tmp_path / "one", out)
     )
     assert one == many
+
+
+@pytest.mark.campaign
+def test_five_hundred_units_over_every_kill_are_those_of_one_process(tmp_path):
+    """On two workers, then on a cluster with kill -9 of a worker, of the client, of the scheduler: each unit once."""
+    made(tmp_path, 500)
+    files = (tmp_path / "fleet.csv", tmp_path / "imu.toml")
+    ic.batch(*files, out=tmp_path / "one")
+    ic.batch(*files, out=tmp_path / "two", workers=2)
+    out = tmp_path / "cluster"
+
+    def begun(file):
+        words = ["batch", files[0], "--study", files[1], "--out", out, "--cluster", file, "--quiet"]
+        command = [sys.executable, "-m", "inercal", *map(str, words)]
+        with open(tmp_path / "said", "a") as said:
+            return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+
+    def at(units, process):
+        while len(list(out.glob("units/*.json"))) < units:
+            assert process.poll() is None, (tmp_path / "said").read_text()
+            time.sleep(0.01)
+
+    first, again = tmp_path / "first", tmp_path / "again"
+    first.mkdir()
+    again.mkdir()
+    with cluster(first) as (file, processes, worker):
+        client = begun(file)
+        at(100, client)
+        processes[1].kill()
+        processes.append(worker())
+        at(200, client)
+        client.kill()
+        client.wait()
+        kept = seconds(out)
+        client = begun(file)
+        at(350, client)
+        processes[0].kill()
+        assert client.wait() == 2
+        assert "the scheduler was lost" in (tmp_path / "said").read_text()
+    assert {name: seconds(out)[name] for name in kept} == kept
+    kept = seconds(out)
+    assert len(kept) < 500
+    with cluster(again) as (file, _, _):
+        client = begun(file)
+        assert client.wait() == 1  # not all units are good
+    assert {name: seconds(out)[name] for name in kept} == kept
+    assert told(tmp_path / "one") == told(tmp_path / "two") == told(out)
+    assert len(list(out.glob("units/*.json"))) == 500

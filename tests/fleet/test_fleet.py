@@ -7,7 +7,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -129,15 +132,21 @@ def test_only_what_changed_is_done_again(there, tmp_path):
     assert all(at != before[name] for name, at in seconds(out).items())
 
 
-@pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
-def test_killed_in_the_middle_it_goes_on(there, tmp_path):
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are listed as on Linux")
+def test_killed_in_the_middle_it_leaves_no_process_and_goes_on(there, tmp_path):
     folder, out = there[0], tmp_path / "killed"
-    words = ["batch", folder / "fleet.csv", "--study", folder / "imu.toml", "--out", out, "--workers", "1"]
+    words = ["batch", folder / "fleet.csv", "--study", folder / "imu.toml", "--out", out, "--workers", "2"]
     process = subprocess.Popen([sys.executable, "-m", "inercal", *map(str, words), "--quiet"])
     while len(list(out.glob("units/*.json"))) < 5 and process.poll() is None:
         time.sleep(0.01)
+    workers = [*map(int, Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split())]
     process.send_signal(signal.SIGKILL)
     process.wait()
+    assert len(workers) >= 2
+    until = time.monotonic() + 30.0
+    while left := [pid for pid in workers if Path(f"/proc/{pid}").exists()]:
+        assert time.monotonic() < until, left
+        time.sleep(0.05)
     before = seconds(out)
     assert 5 <= len(before) < 30
     calibrated(folder, out)
@@ -194,6 +203,20 @@ def test_files_at_a_url(there, tmp_path):
     assert found[0].coefficients == local
     inputs = json.loads((tmp_path / "out" / "results" / "SN 000.json").read_text())["inputs"]
     assert inputs[0]["path"] == "memory://lab/unit000.csv"
+
+
+def test_files_of_a_web_server(there, tmp_path):
+    pytest.importorskip("aiohttp")
+    quiet = type("Quiet", (SimpleHTTPRequestHandler,), {"log_message": lambda *_: None})
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(quiet, directory=there[0])) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        at = f"http://127.0.0.1:{server.server_port}"
+        manifest = tmp_path / "fleet.csv"
+        manifest.write_text(f"serial,files\nSN 000,{at}/unit000.csv\nSN 001,{at}/none.csv\n")
+        found = ic.batch(manifest, there[0] / "imu.toml", out=tmp_path / "out").evidence.rows
+        server.shutdown()
+    assert found[0].coefficients == there[3].evidence.rows[0].coefficients
+    assert found[1].message.startswith(f"{at}/none.csv: cannot be fetched")
 
 
 def test_a_folder_is_a_manifest(tmp_path):

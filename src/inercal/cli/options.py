@@ -310,6 +310,10 @@ ClusterOption = Annotated[
     ),
 ]
 
+CheckpointOption = Annotated[
+    Path | None, Parameter(help="Save here what is done, and go on from it where it exists.")
+]
+
 
 def count_of(workers: int | None, cluster: str | None) -> int:
     """Number of processes, threads or workers of a local cluster by the two options; raises `InputError`."""

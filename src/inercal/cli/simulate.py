@@ -11,6 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import (
+    CheckpointOption,
     ClusterOption,
     FileOutput,
     Overrides,
@@ -80,10 +81,7 @@ def simulate_selfcal(
             help="Simulate and calibrate so often instead, and judge the stated uncertainties.",
         ),
     ] = None,
-    checkpoint: Annotated[
-        Path | None,
-        Parameter(help="Save here what is done, and go on from it where it exists."),
-    ] = None,
+    checkpoint: CheckpointOption = None,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,

@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import abandon_output
-from inercal.cli.options import FileOutput, Output, ReportOutput, ResultOutput, Span, whole_number
+from inercal.cli.options import (
+    CheckpointOption,
+    FileOutput,
+    Output,
+    ReportOutput,
+    ResultOutput,
+    Span,
+    whole_number,
+)
 from inercal.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
@@ -51,9 +59,7 @@ def interval_of(every: str | None) -> float:
 class StreamOptions:
     """The options of a command that works on a stream."""
 
-    checkpoint: Annotated[
-        Path | None, Parameter(help="Save here what is done, and go on from it where it exists.")
-    ] = None
+    checkpoint: CheckpointOption = None
     checkpoint_every: Annotated[
         int, Parameter(converter=whole_number, help="Rows from one save to the next; 1000 if absent.")
     ] = 1000

@@ -63,13 +63,14 @@ class Cluster:
         """Yield the chunks as they are finished.
 
         Work may have a method ``prepare``: it is called on every worker, also on one that comes later, before any
-        chunk. Raises `InputError` without a scheduler or where a worker has another program, `InercalError` where the
-        scheduler is lost, `ChunkLostError` where a chunk ended several workers one after the other.
+        chunk. Raises `InputError` without a scheduler or where a worker has another program or cannot begin,
+        `InercalError` where the scheduler is lost, `ChunkLostError` where a chunk ended several workers one after the
+        other.
         """
         with _client(self) as client:
             distributed = _distributed()
             _same_program(client, self.address)
-            name = _brought(client, work)
+            name = _brought(client, work, self.address)
 
             def submitted(chunk: range) -> Any:
                 return client.submit(_done, name, chunk, pure=False)
@@ -192,8 +193,11 @@ def _versions() -> dict[str, str]:
     }
 
 
-def _brought(client: Any, work: Any) -> str:
-    """Bring work to every worker, and to those that come later; the name by which they know it."""
+def _brought(client: Any, work: Any, address: str) -> str:
+    """Bring work to every worker, and to those that come later; the name by which they know it.
+
+    Raises `InputError` where a worker cannot load or prepare it.
+    """
     name = f"inercal-{uuid.uuid4().hex}"
 
     class Work(_distributed().WorkerPlugin):  # type: ignore[misc]
@@ -204,5 +208,27 @@ def _brought(client: Any, work: Any) -> str:
             if hasattr(self.work, "prepare"):
                 self.work.prepare()
 
-    client.register_plugin(Work())
-    return name
+    for left in reversed(range(_AGAIN)):
+        try:
+            client.register_plugin(Work())
+            return name
+        except Exception as error:  # what a worker raises comes in many classes
+            with suppress(Exception):
+                client.unregister_worker_plugin(name)
+            if isinstance(error, InercalError):
+                raise
+            if left and client.status == "running" and isinstance(error, _distributed().comm.CommClosedError):
+                continue  # a worker was lost meanwhile
+            raise _unable(error, client, address) from error
+    raise AssertionError
+
+
+def _unable(error: Exception, client: Any, address: str) -> InercalError:
+    """The sentence for work that cannot be brought to the workers."""
+    if client.status != "running":
+        return _lost(address)
+    return InputError(
+        "--cluster",
+        f"{address}: a worker cannot begin ({' '.join(str(error).split())}), expected the modules of the work "
+        "in its PYTHONPATH",
+    )

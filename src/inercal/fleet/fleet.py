@@ -165,7 +165,8 @@ def _strange(found: Sequence[Spread]) -> tuple[tuple[Strange, ...], float]:
     places = sorted(set.intersection(*(set(spread.places) for spread in usual)))
     if len(places) < FEWEST:
         return (), math.nan
-    values = np.array([[spread.values[spread.places.index(place)] for spread in usual] for place in places])
+    by_place = [dict(zip(spread.places, spread.values, strict=True)) for spread in usual]
+    values = np.array([[own[place] for own in by_place] for place in places])
     z = standardised(values)
     told = np.isfinite(z).all(axis=0)
     if not told.any():

@@ -247,16 +247,26 @@ def _fetched(url: str, stack: ExitStack) -> str:
     """A copy of what is at a URL."""
     import fsspec
 
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="inercal-"))
+    folder, scheme = stack.enter_context(tempfile.TemporaryDirectory(prefix="inercal-")), url.split("://")[0]
     try:
         system, path = fsspec.core.url_to_fs(url)
-        copy = str(Path(folder) / Path(path).name)
+        name = Path(path).name
+        if name in ("", ".."):
+            raise InputError(url, "names no file, expected one at the end of the address")
+        copy = str(Path(folder) / name)
         system.get(path, copy)
-    except ImportError as error:
-        raise MissingExtraError(f"a file at {url.split('://')[0]}://", "s3") from error
+    except InputError:
+        raise
     except Exception as error:  # each file system has errors of its own
-        raise InputError(url, f"cannot be fetched ({type(error).__name__}: {error})") from error
+        if isinstance(error, ImportError) and scheme in _EXTRAS:
+            raise MissingExtraError(f"a file at {scheme}://", _EXTRAS[scheme]) from error
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(url, f"cannot be fetched ({said})") from error
     return copy
+
+
+_EXTRAS = {"s3": "s3", "gs": "gs", "http": "https", "https": "https"}
+"""Extras with what fsspec needs for files at an address."""
 
 
 def _sha256(path: str | Path) -> str:
