@@ -65,7 +65,7 @@ def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
     began = WALL()
     bench.look(session)
     look = WALL() - began
-    held = bench.look(session)
+    (held,) = bench.look(session)
 
     def zoom(begin: float, end: float) -> int:
         return len(orjson.dumps(figure(held.courses, (begin, end), held.notes)))

@@ -79,5 +79,5 @@ if __name__ == "__main__":
     into = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     with tempfile.TemporaryDirectory() as work, served(Path(work) / "work") as bench, browser() as chromium:
         make_store(str(bench.store))
-        page, _ = opened(chromium, bench, 1100, 760)
+        page, _ = opened(chromium.new_context(viewport={"width": 1100, "height": 760}), bench)
         take(page, bench.base, into)

@@ -68,7 +68,18 @@ VALUES = st.recursive(
 BODIES = st.one_of(
     st.dictionaries(
         st.sampled_from(
-            ["title", "example", "kind", "rate", "number", "instrument", "tool", "settings", "x"]
+            [
+                "title",
+                "example",
+                "kind",
+                "rate",
+                "number",
+                "instrument",
+                "tool",
+                "settings",
+                "earlier",
+                "x",
+            ]
         ),
         VALUES,
         max_size=4,
@@ -81,7 +92,7 @@ ROUTES = st.sampled_from(
         ("POST", "/sessions"),
         ("GET", "/sessions/{}"),
         ("POST", "/sessions/{}/study"),
-        ("PUT", "/sessions/{}/kind"),
+        ("POST", "/sessions/{}/kind"),
         ("POST", "/sessions/{}/jobs"),
         ("GET", "/sessions/{}/files/{}"),
         ("PUT", "/sessions/{}/files/{}"),
@@ -92,7 +103,12 @@ ROUTES = st.sampled_from(
         ("POST", "/jobs/{}/keep"),
         ("POST", "/jobs/{}/certificate"),
         ("POST", "/jobs/{}/convert"),
+        ("POST", "/jobs/{}/compare"),
         ("POST", "/sessions/{}/design"),
+        ("POST", "/plans"),
+        ("POST", "/validation"),
+        ("GET", "/instruments/{}"),
+        ("GET", "/certificates/{}"),
         ("PUT", "/lab"),
     ]
 )

@@ -52,9 +52,9 @@ def browser():
             found.close()
 
 
-def opened(found, bench, width=1366, height=768, **options):
-    """A page that has opened the address of a workbench."""
-    page = found.new_context(viewport={"width": width, "height": height}, **options).new_page()
+def opened(window, bench):
+    """A page that has opened the address of a workbench, in a window that keeps what pages load."""
+    page = window.new_page()
     page.set_default_timeout(60_000)
     watched = Watched(page, bench.base)
     page.goto(bench.address)

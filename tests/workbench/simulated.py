@@ -3,6 +3,7 @@
 import asyncio
 from functools import wraps
 
+from nicegui import Client
 from nicegui.testing.user_simulation import user_simulation
 
 from inercal.workbench.bench import open_bench
@@ -20,7 +21,11 @@ def of_user(test):
                     from inercal.workbench.pages import add_pages
 
                     add_pages(bench)
-                    await test(user, bench, **given)
+                    try:
+                        await test(user, bench, **given)
+                    finally:  # what waits for messages may swallow a cancellation (wait_for of Python 3.11), and go on
+                        for client in [*Client.instances.values()]:
+                            client.outbox.stop()
             finally:
                 bench.close()
 

@@ -2,16 +2,21 @@
 
 import asyncio
 import json
+import tomllib
 
 import pytest
 
+from inercal.examples import EXAMPLES
 from inercal.workbench.bench import KINDS
 from inercal.workbench.jobs import State
+from rows import for_each
 
 pytest.importorskip("nicegui")
 
 from nicegui import ui
 from simulated import of_user
+
+from inercal.workbench.pages.run import part_of
 
 
 async def run(bench, session):
@@ -46,6 +51,101 @@ async def test_pages_of_a_new_session_say_what_is_missing(user, bench):
     ):
         await user.open(f"/sessions/{session.id}/{page}")
         await user.should_see(words)
+
+
+@of_user
+async def test_home_opens_every_example_in_one_click(user, bench):
+    await user.open("/")
+    for name in EXAMPLES:
+        await user.should_see(name)
+    opens = [
+        each.props["aria-label"]
+        for each in user.find(kind=ui.button).elements
+        if each.props.get("aria-label", "").startswith("open example")
+    ]
+    assert sorted(opens) == sorted(f"open example {name}" for name in EXAMPLES)
+
+
+@of_user
+async def test_what_is_at_work_and_what_waits_is_seen(user, bench):
+    session = bench.sessions.begin_with("ferraris-si")
+    running = bench.queue.add(
+        session.id, session.folder, ["monitor", "--quiet"]
+    )  # goes on until it is cancelled
+    waiting = bench.run(session)
+    await user.open("/")
+    await user.should_see("At work")
+    await user.should_see("calibrate imu")
+    await user.open(f"/sessions/{session.id}/run")
+    await user.should_see("The job waits for 1 job before it")
+    await user.open("/")
+    for job in (waiting, running):
+        await asyncio.to_thread(bench.queue.cancel, job.id)
+    await user.should_not_see("At work", retries=30)
+
+
+@for_each(
+    ("words", "part"),
+    [
+        ("reading, 40 %", 0.4),
+        ("start 3 of 12", 0.25),
+        ("filtering (error-state)", None),
+        ("", None),
+        ("0 of 0", 0.0),
+    ],
+)
+def test_progress_in_words_moves_the_bar(words, part):
+    assert part_of(words) == part
+
+
+def chosen(user, label):
+    """The field of that label."""
+    fields = user.find(kind=ui.element).elements
+    return next(each for each in fields if label in (each.props.get("aria-label"), each.props.get("label")))
+
+
+@of_user
+async def test_columns_are_chosen_added_and_taken_out(user, bench):
+    session = bench.sessions.begin("log")
+    rows = "".join(f"{0.01 * k:.2f},0,{0.1 * k},9.8,0.{k},0,0,21\n" for k in range(40))
+    (session.folder / "log.csv").write_text("time,ax,ay,az,gx,gy,gz,warmth\n" + rows)
+    await user.open(f"/sessions/{session.id}/recording?new=1")
+    await user.should_see("Columns to channels", retries=60)
+    column_map = session.folder / "study-map.toml"
+
+    def columns():
+        return tomllib.loads(column_map.read_text())["columns"]
+
+    async def until(reached):
+        for _ in range(60):
+            if reached():
+                return
+            await asyncio.sleep(0.05)
+        assert reached()
+
+    assert columns()["acc_x"]["from"] == "ax"
+    chosen(user, "column of acc_x").set_value('"ay"')
+    chosen(user, "sign of acc_y").set_value(-1)
+    await until(lambda: columns()["acc_x"]["from"] == "ay" and columns()["acc_y"].get("sign") == -1)
+    look = bench.look(bench.sessions.get(session.id))
+    assert look[0].record["acc_x"].values[10] == pytest.approx(1.0)
+    assert look[0].record["acc_y"].values[10] == pytest.approx(-1.0)
+    chosen(user, "column of gyro_z").set_value("")
+    await until(lambda: "gyro_z" not in columns())
+    chosen(user, "One more channel").set_value("temperature")
+    chosen(user, "From").set_value('"warmth"')
+    chosen(user, "Unit").set_value("degC")
+    user.find("Add").click()
+    await until(lambda: columns().get("temperature") == {"from": "warmth", "unit": "degC"})
+    assert bench.look(bench.sessions.get(session.id))[0].record["temperature"].values[0] == 21.0
+
+
+@of_user
+async def test_repeat_runs_are_looked_at_one_by_one(user, bench):
+    session = bench.sessions.begin_with("five-years")
+    await user.open(f"/sessions/{session.id}/recording")
+    await user.should_see("20 runs", retries=60)
+    assert len(bench.look(session)) == 20
 
 
 @of_user

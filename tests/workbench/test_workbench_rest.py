@@ -1,11 +1,13 @@
 """REST: from an uploaded recording to a result, a kept one and a certificate; what is refused, and how."""
 
+import http.client
 import json
 
 import pytest
 from serving import LAB, served
 
 from inercal.examples import EXAMPLES, FOLDER
+from rows import for_each
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,15 @@ def test_from_an_upload_to_a_certificate(bench, tmp_path):
     assert written["code"] == 0, written["said"]
     status, xml = bench.ask(f"/api/v1/jobs/{asked['job']}/files/certificate.xml")
     assert "digitalCalibrationCertificate" in xml
+    assert [each["serial"] for each in bench.ask("/api/v1/instruments")[1]] == ["2"]
+    status, of_unit = bench.ask("/api/v1/instruments/2")
+    assert [each["status"] for each in of_unit["results"]] == ["ok"]
+    assert [each["number"] for each in of_unit["certificates"]] == ["T-1"]
+    assert bench.ask("/api/v1/certificates/T-1") == (200, xml)
+    assert "T-1" in bench.ask("/api/v1/certificates/T-1?page=true")[1]
+    assert bench.ask("/api/v1/certificates/T-2")[0] == 422
+    status, asked = bench.ask(f"/api/v1/jobs/{job['job']}/compare", {"earlier": job["job"]})
+    assert bench.ended(asked["job"])["code"] == 0
 
 
 @pytest.mark.parametrize(
@@ -109,6 +120,29 @@ def test_nothing_is_answered_without_the_key(bench):
         assert bench.ask(path, key=False)[0] == 401
     assert bench.ask("/api/v1/sessions", headers={"Host": "evil.example"})[0] == 421
     assert bench.ask("/api/v1/sessions", headers={"Origin": "http://evil.example"})[0] == 403
+
+
+@for_each(
+    ("host", "origin", "key", "status"),
+    [
+        (None, None, True, 101),
+        (None, "http://evil.example", True, 403),
+        ("evil.example", "http://evil.example", True, 403),
+        (None, None, False, 403),
+    ],
+)
+def test_a_websocket_opens_to_this_machine_its_own_pages_and_the_key_alone(bench, host, origin, key, status):
+    here = bench.base.split("//")[1]
+    connection = http.client.HTTPConnection(here, timeout=60)
+    connection.putrequest("GET", "/_nicegui_ws/socket.io/?EIO=4&transport=websocket", skip_host=True)
+    headers = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+    headers |= {"Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Host": host or here}
+    headers |= {"Authorization": f"Bearer {bench.key if key else 'none'}", "Origin": origin or bench.base}
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    assert connection.getresponse().status == status
+    connection.close()
 
 
 def test_programs_find_a_description(bench):

@@ -89,7 +89,7 @@ def test_a_toml_file_is_the_map_or_the_study(sessions):
     session = sessions.begin("test")
     assert sent(session, "any.toml", b'[columns.t]\nfrom = "t"\nunit = "s"\n').name == MAP
     assert sent(session, "other.toml", b'[site]\nlatitude = "45 deg"\n').name == STUDY
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=r"^broken\.toml: not valid TOML"):
         sent(session, "broken.toml", b"[[[")
     assert session.recordings == []
 
@@ -97,7 +97,7 @@ def test_a_toml_file_is_the_map_or_the_study(sessions):
 def test_examples_begin_sessions_whose_commands_are_theirs(sessions, tmp_path):
     words = {" ".join(command) for command in COMMANDS.values()}
     for example in EXAMPLES.values():
-        if example.verb in words and len(example.records) < 3:
+        if example.verb in words:
             session = sessions.begin_with(example.name)
             arguments = session.command(tmp_path / "o.json", tmp_path / "r.html")
             assert " ".join(arguments).startswith(example.verb)

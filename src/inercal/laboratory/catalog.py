@@ -16,6 +16,7 @@ from inercal.laboratory.database import reading
 from inercal.laboratory.keep import Item
 from inercal.laboratory.store import Store
 from inercal.laboratory.tables import (
+    Certificate,
     Certified,
     Coefficient,
     Instrument,
@@ -230,6 +231,21 @@ def show(store: Store, identity: str) -> Shown:
         reason or "",
         numbers,
     )
+
+
+def certificates(store: Store, instrument: str | None = None) -> list[dict[str, Any]]:
+    """The certificates of all results, or of an instrument's as of `results`, in the order in which they were issued.
+
+    Of each its number, when it was issued, the number that it supersedes, and the objects of its XML and page.
+    """
+    query = select(Certificate.__table__).order_by(Certificate.issued, Certificate.number)
+    if instrument is not None:
+        of = select(Certified.number).join(Result, Result.id == Certified.result_id)
+        query = query.where(
+            Certificate.number.in_(of.where(Result.instrument_id.in_(numbers_of(store, instrument))))
+        )
+    with reading(store.engine, store.where) as connection:
+        return [dict(row) for row in connection.execute(query).mappings()]
 
 
 def estimate_in(store: Store, sha256: str) -> Estimate:

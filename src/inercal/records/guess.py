@@ -97,12 +97,24 @@ def guess_map(
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
-    """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
+def columns_of(path: Path) -> tuple[Origin, ...]:
+    """The columns of a file in their order, as a map names them; raises `RecordError` where it cannot be read."""
+    return tuple(
+        _origin(sample, index) for sample in _samples(path) for index in range(sample.values.shape[1])
+    )
+
+
+def _samples(path: Path) -> Sequence[Sample]:
+    """The first look at the arrays of a file; raises `RecordError`."""
     try:
-        samples = sorted(format_of(path).peek(path), key=lambda sample: -len(sample.values))
+        return format_of(path).peek(path)
     except OSError as error:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
+
+
+def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
+    """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
+    samples = sorted(_samples(path), key=lambda sample: -len(sample.values))
     lengths: dict[int, dict[str, _Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})

@@ -23,8 +23,12 @@ if TYPE_CHECKING:
     from inercal.designs.foresight import Foresight
     from inercal.face.result import Result
     from inercal.face.study import Study
+    from inercal.laboratory.catalog import Listed
     from inercal.records.record import Record
     from inercal.workbench.charts import Course, Notes
+
+VALIDATION = "validation"
+"""The jobs of the validation, which are of no session."""
 
 _HELD = 2
 """Recordings that are held in memory."""
@@ -32,8 +36,9 @@ _HELD = 2
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A recording that was read: the record, its channels as they are drawn, and the notes on them."""
+    """A run that was read: names of its ``files``, the record, its channels as they are drawn, and notes on them."""
 
+    files: str
     record: Record
     courses: tuple[Course, ...]
     notes: Notes
@@ -47,13 +52,13 @@ class Bench:
     sessions: Sessions
     queue: Queue
     store: str | None = None
-    _looked: OrderedDict[tuple[Any, ...], Looked] = field(default_factory=OrderedDict, repr=False)
+    _looked: OrderedDict[tuple[Any, ...], tuple[Looked, ...]] = field(default_factory=OrderedDict, repr=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
-    def look(self, session: Session) -> Looked:
-        """Read the recordings of a session; raises `InputError`. The last few are held."""
+    def look(self, session: Session) -> tuple[Looked, ...]:
+        """Read the recordings of a session, of each repeat run; raises `InputError`. Those of the last few are held."""
         from inercal.records.quiet import quiet
-        from inercal.records.read import read
+        from inercal.records.read import read_runs
         from inercal.workbench.charts import Notes, courses, marks_of
 
         files = [*session.recordings, *filter(None, [session.map])]
@@ -64,9 +69,10 @@ class Bench:
             if key not in self._looked:
                 while len(self._looked) >= _HELD:
                     self._looked.popitem(last=False)
-                record = read(session.recordings, session.map)
-                notes = Notes(marks_of(record), quiet(record))
-                self._looked[key] = Looked(record, courses(record), notes)
+                self._looked[key] = tuple(
+                    Looked(_files_of(record), record, courses(record), Notes(marks_of(record), quiet(record)))
+                    for record in read_runs(session.recordings, session.map)
+                )
             self._looked.move_to_end(key)
             return self._looked[key]
 
@@ -96,6 +102,13 @@ class Bench:
             (session.folder / MAP).unlink(missing_ok=True)
         return session
 
+    def begin_map(self, session: Session) -> None:
+        """Write a guessed map for the recordings of a session; raises `InputError` where they cannot be read."""
+        from inercal.records.guess import guess_map
+
+        table, model = session.kind == "turntable", session.kind == "aoa"
+        put(session, MAP, guess_map(session.recordings, on_table=table, of_model=model))
+
     def run(self, session: Session) -> Job:
         """Put the calibration of a session into the queue; raises `InputError` where a part is missing."""
         words = session.command(Path("{out}/result.json"), Path("{out}/report.html"))
@@ -103,7 +116,11 @@ class Bench:
 
     def plan(self, kind: str) -> Session:
         """A new session with a study of that kind to plan a test with, without a recording; raises `InputError`."""
-        session = self.sessions.begin(f"plan of a test: {KINDS.get(kind, kind)}")
+        from inercal.face.foresight import PLANNED
+
+        if kind not in PLANNED:
+            raise InputError("kind", f"found {kind!r}, expected one of {', '.join(PLANNED)}")
+        session = self.sessions.begin(f"plan of a test: {KINDS[kind]}")
         return self.begin_study(session, kind)
 
     def foreseen(self, session: Session) -> tuple[Study, Foresight, Planned]:
@@ -213,6 +230,40 @@ class Bench:
             raise InputError(f"job {job.id}", f"has no result, it is {job.state.value}")
         return os.path.relpath(job.result, job.where)
 
+    def validate(self) -> Job:
+        """Put the validation of this machine into the queue."""
+        words = ["validate", "--out", "{out}/result.json", "--report", "{out}/report.html"]
+        return self.queue.add(VALIDATION, self.root, words)
+
+    def instruments(self) -> list[dict[str, Any]]:
+        """The instruments of the store; raises `InputError`."""
+        from inercal.laboratory.catalog import instruments
+        from inercal.laboratory.store import open_store
+
+        return instruments(open_store(self.store))
+
+    def kept(self, serial: str) -> tuple[list[Listed], list[dict[str, Any]]]:
+        """Results and certificates of an instrument of the store, the oldest first; raises `InputError`."""
+        from inercal.laboratory.catalog import certificates, results
+        from inercal.laboratory.store import open_store
+
+        store = open_store(self.store)
+        return results(store, serial), certificates(store, serial)
+
+    def certificate(self, number: str, page: bool = False) -> bytes:
+        """A certificate of the store as XML, or as a page; raises `InputError` where there is none."""
+        from inercal.laboratory.catalog import certificates
+        from inercal.laboratory.store import open_store
+
+        store = open_store(self.store)
+        row = next((each for each in certificates(store) if each["number"] == number), None)
+        place = None if row is None else row["page" if page else "object"]
+        if place is None:
+            raise InputError(
+                f"certificate {number}", f"found none in {store.where}, expected one of the list"
+            )
+        return store.objects.read(place)
+
     def last_job(self, session: Session) -> Job | None:
         """The newest calibration of a session, None without any."""
         return next((job for job in self.queue if job.session == session.id and job.calibrates), None)
@@ -224,6 +275,11 @@ class Bench:
     def close(self) -> None:
         """End the running job."""
         self.queue.close()
+
+
+def _files_of(record: Record) -> str:
+    """Names of the files that a record is from."""
+    return ", ".join(dict.fromkeys(Path(column.source.path).name for column in record.columns.values()))
 
 
 def open_bench(root: Path, store: str | None = None) -> Bench:

@@ -105,6 +105,43 @@ def rest_of(bench: Bench) -> FastAPI:
         """Put the calibration into the queue."""
         return _of_job(bench.run(bench.sessions.get(number)))
 
+    @app.post("/plans", status_code=201)
+    def plan(kind: Annotated[str, Body(embed=True)]) -> dict[str, Any]:
+        """Begin a session with a study of that kind to plan a test with, without a recording."""
+        return _of_session(bench.plan(kind))
+
+    @app.post("/validation", status_code=202)
+    def validate() -> dict[str, Any]:
+        """Run the published and closed-form cases on this machine."""
+        return _of_job(bench.validate())
+
+    @app.get("/instruments")
+    def instruments() -> list[dict[str, Any]]:
+        """The instruments of the store."""
+        return bench.instruments()
+
+    @app.get("/instruments/{serial:path}")
+    def kept(serial: str) -> dict[str, Any]:
+        """Results and certificates of an instrument, the oldest first."""
+        results, certificates = bench.kept(serial)
+        own = ("id", "command", "status", "message", "made", "measured", "superseded_by")
+        return {
+            "results": [{name: getattr(each, name) for name in own} for each in results],
+            "certificates": [
+                {name: each[name] for name in ("number", "issued", "supersedes")} for each in certificates
+            ],
+        }
+
+    @app.get("/certificates/{number:path}")
+    def certificate(number: str, page: bool = False) -> Response:
+        """A certificate of the store: its XML, or its page."""
+        content = bench.certificate(number, page)
+        kind = "text/html" if page else "application/xml"
+        headers = (
+            _ALONE if page else {**_ALONE, "content-disposition": 'attachment; filename="certificate.xml"'}
+        )
+        return Response(content, media_type=kind, headers=headers)
+
     @app.get("/jobs")
     def jobs() -> list[dict[str, Any]]:
         """All jobs, the newest first."""
@@ -145,6 +182,11 @@ def rest_of(bench: Bench) -> FastAPI:
         """Search for a better plan of the test that the study of a session plans; settings as of --set."""
         return _of_job(bench.design(bench.sessions.get(number), settings))
 
+    @app.post("/jobs/{number}/compare", status_code=202)
+    def compare(number: str, earlier: Annotated[str, Body(embed=True)]) -> dict[str, Any]:
+        """Set the result of a job beside that of an earlier one."""
+        return _of_job(bench.compare(bench.queue.get(earlier), bench.queue.get(number)))
+
     @app.post("/jobs/{number}/certificate", status_code=202)
     def certify(number: str, certified: Certified) -> dict[str, Any]:
         """Write a certificate of the result of a job, with what the laboratory states."""
@@ -157,6 +199,10 @@ def rest_of(bench: Bench) -> FastAPI:
         return Response(status_code=204)
 
     return app
+
+
+_ALONE = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+"""Headers of a file that may hold names from a foreign one: it asks for nothing, and nobody keeps it."""
 
 
 def _refused(request: Request, error: Exception) -> JSONResponse:
@@ -206,9 +252,8 @@ def _file(folder: Path, name: str) -> FileResponse:
     path = folder / safe_name(name)
     if safe_name(name) != name or not path.is_file():
         raise InputError(name, "no such file")
-    headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
     kind = {".html": "text/html", ".json": "application/json", ".xml": "application/xml"}
     media = kind.get(path.suffix.lower(), "application/octet-stream")
     if media != "text/html":
-        return FileResponse(path, media_type=media, filename=path.name, headers=headers)
-    return FileResponse(path, media_type=media, headers=headers)
+        return FileResponse(path, media_type=media, filename=path.name, headers=_ALONE)
+    return FileResponse(path, media_type=media, headers=_ALONE)

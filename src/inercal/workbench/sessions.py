@@ -214,7 +214,10 @@ def _place(part: Path, name: str) -> str:
         return name
     from inercal._toml import read_toml
 
-    data = read_toml(part, InputError)
+    try:
+        data = read_toml(part, InputError)
+    except InputError as error:  # by the name that it was sent under
+        raise InputError(name, error.message) from error
     return MAP if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig", "imu"} else STUDY
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import contextmanager
+from typing import Any
 
 from nicegui import ui
 
@@ -58,8 +59,12 @@ def _way(target: str, words: str, here: bool) -> None:
 
 
 def _words_of_uploads() -> None:
-    """The line that says how far an upload is."""
-    ui.element("div").props('id=upload-words aria-live="polite"').classes("quiet")
+    """The line at the foot of the window that says how far an upload is, and what was copied or refused."""
+    ui.html(
+        '<div id="upload-words" role="status" hidden><span></span> <progress max="1" aria-label="upload" hidden>'
+        '</progress> <a href="/" hidden>Go on with the others</a></div>',
+        sanitize=False,
+    )
 
 
 def refused(error: BaseException) -> None:
@@ -78,9 +83,30 @@ def told() -> Iterator[None]:
 
 def command(words: str) -> None:
     """The command that does the same, to copy."""
-    with ui.row(wrap=False).classes("items-center w-full"):
+    with ui.row(wrap=False).classes("items-center w-full copies"):
         ui.label(words).classes("command grow").props('data-command="1"')
-        button("Copy", lambda: ui.clipboard.write(words))
+        copy("copy the command")
+
+
+def copy(label: str) -> None:
+    """The button that copies the command or the text which stands in the same ``copies``."""
+    made = (
+        ui.button("Copy", color=None)
+        .props(f'no-caps unelevated aria-label="{label}"')
+        .classes("act self-start")
+    )
+    made.on("click", js_handler="(event) => inercalCopy(event.currentTarget)")
+
+
+def picture(figure: dict[str, Any], label: str) -> ui.plotly:
+    """A picture of plotly. Its height is there before it is drawn, so that nothing below moves under a click."""
+    made = ui.plotly(figure).classes("w-full").props(f'aria-label="{label}" role="group"')
+    return made.style(f"min-height: {figure['layout']['height']}px")
+
+
+def saved(session: Session, name: str) -> None:
+    """The way to a file of a session, to keep it elsewhere."""
+    ui.link(f"Save {name} elsewhere", f"/api/v1/sessions/{session.id}/files/{name}")
 
 
 def button(words: str, act: Callable[[], object], label: str = "", main: bool = False) -> ui.button:

@@ -7,13 +7,16 @@ from functools import partial
 
 from nicegui import ui
 
-from inercal.examples import EXAMPLES
+from inercal.examples import EXAMPLES, Example
 from inercal.face.foresight import PLANNED
 from inercal.workbench.bench import KINDS, Bench
+from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import button, framed, heading, table, told
 from inercal.workbench.sessions import COMMANDS, Session
 
 _SHOWN = 20
+_EVERY = 1.0
+"""Time [s] between two looks at the queue."""
 
 
 def add(bench: Bench) -> None:
@@ -33,20 +36,25 @@ def add(bench: Bench) -> None:
     def home(every: str = "") -> None:
         with framed("Home"):
             drop()
-            heading("Sessions")
-            sessions(bench, bool(every))
+            _watched(bench, bool(every))
             heading("Shipped examples")
-            verbs = {" ".join(words) for words in COMMANDS.values()}
             rows: list[list[str | Callable[[], object]]] = [
-                [example.name, example.title, partial(_button, example.name, begin)]
+                [example.name, _title(example), partial(_button, example.name, begin)]
                 for example in EXAMPLES.values()
-                if example.verb in verbs and len(example.records) < 3
             ]
             table(["Name", "What it is", ""], rows)
             heading("Plan a test")
             with ui.row():
                 for kind in PLANNED:
                     button(KINDS[kind], partial(plan, kind), label=f"plan: {KINDS[kind]}")
+
+
+def _title(example: Example) -> str:
+    """What an example is; and its command, where that has no page here."""
+    has_page = tuple(example.verb.split()) in COMMANDS.values()
+    return (
+        example.title if has_page else f"{example.title}; to look at, its command is inercal {example.verb}"
+    )
 
 
 def _button(name: str, begin: Callable[[str], None]) -> None:
@@ -63,6 +71,58 @@ def drop() -> None:
         ui.element("input").props(
             'type=file multiple aria-label="choose recordings" onchange="inercalTake(this)"'
         )
+
+
+def _watched(bench: Bench, every: bool) -> None:
+    """What is at work or waits, and the sessions; drawn anew when a job begins or ends."""
+    place = ui.element("div").classes("w-full flex flex-col gap-3")
+    at_work: list[tuple[str, State]] | None = None
+    progress: dict[str, ui.label] = {}
+
+    def look() -> None:
+        nonlocal at_work
+        jobs = [job for job in bench.queue if job.state not in ENDED]
+        now = [(job.id, job.state) for job in jobs]
+        if now != at_work:
+            at_work = now
+            place.clear()
+            with place:
+                progress.clear()
+                progress.update(_at_work(bench, jobs))
+                heading("Sessions")
+                sessions(bench, every)
+        for job in jobs:
+            progress[job.id].set_text(job.progress or job.state.value)
+
+    look()
+    ui.timer(_EVERY, look)
+
+
+def _at_work(bench: Bench, jobs: list[Job]) -> dict[str, ui.label]:
+    """The jobs that run or wait, the next first, each with the label of what it is at."""
+    if not jobs:
+        return {}
+    heading("At work")
+    made: dict[str, ui.label] = {}
+    titles = {session.id: session.title for session in bench.sessions}
+
+    def state(job: Job) -> None:
+        made[job.id] = ui.label()
+
+    def of_session(job: Job) -> None:
+        if job.session in titles:
+            ui.link(f"{job.session} {titles[job.session]}", f"/sessions/{job.session}/run")
+        else:
+            ui.label(job.session)
+
+    table(
+        ["Job", "Session", "Command", "State"],
+        [
+            [job.id, partial(of_session, job), " ".join(job.arguments[:2]), partial(state, job)]
+            for job in reversed(jobs)
+        ],
+    )
+    return made
 
 
 def sessions(bench: Bench, every: bool) -> None:

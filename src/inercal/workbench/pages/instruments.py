@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
-from urllib.parse import urlencode
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, urlencode
 
 from nicegui import ui
 
 from inercal.errors import InercalError
+from inercal.laboratory.catalog import SHORT
 from inercal.workbench.bench import Bench
-from inercal.workbench.pages.frame import PATIENCE, command, framed, refused, table
+from inercal.workbench.pages.frame import PATIENCE, command, framed, heading, refused, table
+
+if TYPE_CHECKING:
+    from inercal.laboratory.catalog import Listed
 
 
 def add(bench: Bench) -> None:
@@ -22,7 +27,7 @@ def add(bench: Bench) -> None:
     async def show() -> None:
         with framed("Instruments"):
             try:
-                found = await asyncio.to_thread(_instruments, bench)
+                found = await asyncio.to_thread(bench.instruments)
             except InercalError as error:
                 refused(error)
                 ui.label("The first result that is kept needs a store; make one with:").classes("quiet")
@@ -50,31 +55,66 @@ def add(bench: Bench) -> None:
                 ],
             )
 
-    @ui.page("/instrument", response_timeout=PATIENCE)
+    @ui.page("/instrument")
     async def one(serial: str) -> None:
-        from inercal.face.laboratory import history
-
         with framed("Instruments"):
-            try:
-                result = await asyncio.to_thread(history, serial, store=bench.store)
-                page = await asyncio.to_thread(result.view.page)
-            except InercalError as error:
-                refused(error)
-                return
-            ui.label(f"{result.status.value}: {result.message}").classes("verdict")
-            frame = (
-                ui.element("iframe")
-                .props('title="history" sandbox="allow-scripts allow-popups"')
-                .classes("report")
-            )
-            frame.props["srcdoc"] = page
-            words = ["inercal", "history", serial, "--report", "history.html"]
-            command(shlex.join([*words, *(["--store", bench.store] if bench.store else [])]))
+            place, spinner = ui.element("div").classes("w-full flex flex-col gap-3"), ui.spinner()
+            await ui.context.client.connected()  # charts of many years take a moment
+            with place:
+                try:
+                    _kept(*await asyncio.to_thread(bench.kept, serial))
+                    await _history(bench, serial)
+                except InercalError as error:
+                    refused(error)
+            spinner.delete()
 
 
-def _instruments(bench: Bench) -> list[dict[str, Any]]:
-    """The instruments of the store."""
-    from inercal.laboratory.catalog import instruments
-    from inercal.laboratory.store import open_store
+async def _history(bench: Bench, serial: str) -> None:
+    """How each coefficient of an instrument moved; raises `InputError`."""
+    from inercal.face.laboratory import history
 
-    return instruments(open_store(bench.store))
+    heading("History")
+    result = await asyncio.to_thread(history, serial, store=bench.store)
+    page = await asyncio.to_thread(result.view.page)
+    ui.label(f"{result.status.value}: {result.message}").classes("verdict")
+    frame = (
+        ui.element("iframe").props('title="history" sandbox="allow-scripts allow-popups"').classes("report")
+    )
+    frame.props["srcdoc"] = page
+    words = ["inercal", "history", serial, "--report", "history.html"]
+    command(shlex.join([*words, *(["--store", bench.store] if bench.store else [])]))
+
+
+def _kept(results: Sequence[Listed], certificates: Sequence[Mapping[str, Any]]) -> None:
+    """What was kept of an instrument, the newest first."""
+    heading("Results")
+    table(
+        ["Date", "Result", "Command", "Verdict", ""],
+        [
+            [
+                each.date,
+                each.id[:SHORT],
+                each.command,
+                f"{each.status}: {each.message}",
+                "" if each.superseded_by is None else f"superseded by {each.superseded_by[:SHORT]}",
+            ]
+            for each in reversed(results)
+        ],
+    )
+    heading("Certificates")
+    if not certificates:
+        ui.label("None was written yet.").classes("quiet")
+        return
+
+    def links(number: str) -> None:
+        target = f"/api/v1/certificates/{quote(number, safe='')}"
+        ui.link("page", f"{target}?page=true", new_tab=True).classes("mr-4")
+        ui.link("XML", target, new_tab=True)
+
+    table(
+        ["Number", "Issued", "Supersedes", ""],
+        [
+            [each["number"], each["issued"][:10], each["supersedes"] or "", partial(links, each["number"])]
+            for each in reversed(certificates)
+        ],
+    )

@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import asyncio
 import math
-import tomllib
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
 from nicegui import events, ui
 
-from inercal._files import read_bytes
 from inercal.errors import InercalError
-from inercal.records.channels import is_channel
+from inercal.records.places import counted
 from inercal.workbench.bench import KINDS, Bench, Looked
 from inercal.workbench.charts import Notes, figure
-from inercal.workbench.form import Widget, as_toml, changed
-from inercal.workbench.pages.frame import PATIENCE, button, command, framed, heading, refused, table, told
+from inercal.workbench.pages.columns import Columns, columns_there
+from inercal.workbench.pages.frame import (
+    PATIENCE,
+    button,
+    command,
+    framed,
+    heading,
+    picture,
+    refused,
+    table,
+    told,
+)
 from inercal.workbench.pages.home import drop
 from inercal.workbench.residuals import spans_of
-from inercal.workbench.sessions import MAP, STUDY, Session, put
+from inercal.workbench.sessions import MAP, STUDY, Session
 
 
 def add(bench: Bench) -> None:
@@ -47,16 +56,26 @@ def add(bench: Bench) -> None:
             with ui.element("div").classes("w-full") as place:
                 ui.spinner()
             await ui.context.client.connected()
-            await _look(bench, session, place, (begin, end) if begin < end else None)
+            span = (begin, end) if begin < end else None
+            redrawn = partial(_look, bench, session, place, span)
+            await redrawn()
             if session.map is not None:
-                heading("Columns to channels")
-                _map(session)
+                Columns(session, await asyncio.to_thread(columns_there, session), redrawn)
+            else:
+                button("Choose the columns by hand", partial(_map, bench, session))
             heading("The same from the command line")
             words = " ".join(path.name for path in session.recordings)
             mapped = f" --map {MAP}" if session.map is not None else ""
             command(f"inercal new {session.kind} {words} --out {STUDY}")
             command(f"inercal inspect {words}{mapped} --report recording.html")
             drop()
+
+
+async def _map(bench: Bench, session: Session) -> None:
+    """Begin a map, of recordings whose headers already say what they hold."""
+    with told():
+        await asyncio.to_thread(bench.begin_map, session)
+        ui.navigate.reload()
 
 
 def _kind(bench: Bench, session: Session) -> None:
@@ -84,9 +103,10 @@ def _kind(bench: Bench, session: Session) -> None:
 
 
 async def _look(bench: Bench, session: Session, place: ui.element, span: tuple[float, float] | None) -> None:
-    """Channels, findings and pictures of the recording, over a ``span`` of time [s] or the whole."""
+    """Channels, findings and pictures of the recording, over a ``span`` of time [s] or the whole; of repeat runs those
+    of the one that is chosen."""
     try:
-        looked = await asyncio.to_thread(bench.look, session)
+        runs = await asyncio.to_thread(bench.look, session)
         found = await asyncio.to_thread(_rests, bench, session)
     except InercalError as error:
         place.clear()
@@ -95,15 +115,32 @@ async def _look(bench: Bench, session: Session, place: ui.element, span: tuple[f
         return
     place.clear()
     with place:
-        findings = looked.record.findings
-        ui.label("Nothing suspicious was found." if not findings else f"{len(findings)} findings:").props(
-            'data-findings="1"'
-        )
-        for finding in findings[:20]:
-            where = f" ({finding.where})" if finding.where else ""
-            ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
-        _pictures(looked, replace(looked.notes, rests=found) if found else looked.notes, span)
-        _channels(looked)
+        if len(runs) > 1:
+            names = {k: f"run {k + 1}: {looked.files}" for k, looked in enumerate(runs)}
+            ui.select(
+                names, value=0, label=f"{len(runs)} runs", on_change=lambda event: show(runs[event.value])
+            ).classes("w-96 max-w-full")
+        inner = ui.element("div").classes("w-full")
+
+    def show(looked: Looked) -> None:
+        inner.clear()
+        with inner:
+            _one(looked, found if len(runs) == 1 else (), span)
+
+    show(runs[0])
+
+
+def _one(looked: Looked, rests: Sequence[tuple[float, float]], span: tuple[float, float] | None) -> None:
+    """One run: what was found, its pictures and numbers; ``rests`` as a result took them, if there is one."""
+    findings = looked.record.findings
+    ui.label(
+        "Nothing suspicious was found." if not findings else f"{counted(len(findings), 'finding')}:"
+    ).props('data-findings="1"')
+    for finding in findings[:20]:
+        where = f" ({finding.where})" if finding.where else ""
+        ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+    _pictures(looked, replace(looked.notes, rests=rests) if rests else looked.notes, span)
+    _channels(looked)
 
 
 def _rests(bench: Bench, session: Session) -> tuple[tuple[float, float], ...]:
@@ -119,8 +156,7 @@ def _rests(bench: Bench, session: Session) -> tuple[tuple[float, float], ...]:
 def _pictures(looked: Looked, notes: Notes, span: tuple[float, float] | None) -> None:
     """All channels over time; what one zooms to is drawn anew."""
     shown = looked.courses
-    plot = ui.plotly(figure(shown, span, notes)).classes("w-full")
-    plot.props('aria-label="channels over time" role="group"')
+    plot = picture(figure(shown, span, notes), "channels over time")
     if notes.rests:
         ui.label(
             f"{len(notes.rests)} rests are shaded green, turns between them red. Drag to zoom, double-click for all."
@@ -159,76 +195,3 @@ def _channels(looked: Looked) -> None:
     ]  # fmt: skip
     head = ["Channel", "Unit", "Rows", "Missing", "Mean", "Deviation", "Least", "Greatest"]
     table(head, rows, {2, 3, 4, 5, 6, 7})
-
-
-def _map(session: Session) -> None:
-    """The columns of the map, each with its channel, unit, sign and kind, to change."""
-    text = read_bytes(session.folder / MAP).decode(errors="replace")
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        refused(error)
-        return
-    parts = [("columns", data.get("columns", {}))]
-    files = data.get("file", {})
-    parts += [
-        (f"file.{name}.columns", part["columns"]) for name, part in files.items() if isinstance(part, dict)
-    ]
-
-    def change(path: str, value: str, widget: Widget) -> None:
-        with told():
-            now = read_bytes(session.folder / MAP).decode()
-            put(session, MAP, changed(now, path, as_toml(value, widget)))
-            ui.navigate.reload()
-
-    rows = []
-    for where, columns in parts:
-        for name, entry in columns.items():
-            if isinstance(entry, dict) and is_channel(name):
-                rows.append(_row(f"{where}.{name}", name, entry, change))
-    table(["Channel", "From", "Unit", "Sign", "Kind"], rows)
-    ui.label("What else a map can say is changed in its text:").classes("quiet")
-    _text(session, MAP, text)
-
-
-def _row(path: str, name: str, entry: dict[str, Any], change: Any) -> list[Any]:
-    """A channel of the map."""
-
-    def unit() -> None:
-        field = (
-            ui.input(value=str(entry.get("unit", "")))
-            .props(f'dense aria-label="unit of {name}"')
-            .classes("w-28")
-        )
-        field.on("change", lambda: change(f"{path}.unit", field.value, "text"))
-
-    def sign() -> None:
-        ui.select(
-            {1: "+", -1: "-"}, value=entry.get("sign", 1),
-            on_change=lambda event: change(f"{path}.sign", str(event.value), "value"),
-        ).props(f'dense aria-label="sign of {name}"')  # fmt: skip
-
-    def kind() -> None:
-        ui.select(
-            ["rate", "increment"], value=entry.get("kind", "rate"),
-            on_change=lambda event: change(f"{path}.kind", event.value, "text"),
-        ).props(f'dense aria-label="kind of {name}"')  # fmt: skip
-
-    return [name, str(entry.get("from", "")), unit, sign, kind]
-
-
-def _text(session: Session, name: str, text: str) -> None:
-    """A file of the session as text, to change."""
-    editor = (
-        ui.textarea(value=text)
-        .props(f'outlined autogrow aria-label="text of {name}"')
-        .classes("w-full command")
-    )
-
-    def save() -> None:
-        with told():
-            tomllib.loads(editor.value)
-            put(session, name, editor.value)
-            ui.navigate.reload()
-
-    button(f"Save {name}", save)

@@ -23,6 +23,7 @@ from inercal.workbench.pages.frame import (
     command,
     framed,
     heading,
+    picture,
     refused,
     report,
     table,
@@ -102,7 +103,7 @@ def _residuals(session: Session, result: Result) -> None:
     if not parts:
         return
     heading("Residuals")
-    plot = ui.plotly(figure(parts)).classes("w-full").props('aria-label="residuals over time" role="group"')
+    plot = picture(figure(parts), "residuals over time")
     place = ui.element("div").props('aria-live="polite" data-chosen="1"')
     with place:
         ui.label("Click one to see its samples.").classes("quiet text-sm")
@@ -156,15 +157,12 @@ def _converted(bench: Bench, job: Job) -> None:
     """The calibration in the files of other tools."""
     from inercal.convert.other_tools import CONVENTIONS
 
-    links = ui.row()
+    place = ui.element("div").classes("w-full")
 
     async def convert(tool: str) -> None:
         with told():
-            asked = bench.convert(job, tool)
-            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
-            _say(ended, f"It is written for {tool}.")
-            links.clear()
-            with links:
+            ended = await _done(bench, bench.convert(job, tool), f"It is written for {tool}.", place)
+            with place:
                 for path in sorted(ended.folder.glob(f"{tool}*")):
                     ui.link(path.name, f"/api/v1/jobs/{ended.id}/files/{path.name}", new_tab=True)
 
@@ -210,11 +208,10 @@ def _kept(bench: Bench, job: Job) -> None:
 
     async def keep() -> None:
         with told():
-            asked = bench.keep(job, name.value or "")
-            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
-            _say(ended, "It is kept.")
+            await _done(bench, bench.keep(job, name.value or ""), "It is kept.", place)
 
     button("Keep", keep)
+    place = ui.element("div").classes("w-full")
 
 
 def _certificate(bench: Bench, job: Job) -> None:
@@ -237,22 +234,30 @@ def _certificate(bench: Bench, job: Job) -> None:
 
         button("Save lab.toml", state)
     number = ui.input("Number of the certificate")
-    links = ui.row()
 
     async def certify() -> None:
         with told():
             asked = bench.certify(job, number.value or "")
-            ended = await asyncio.to_thread(bench.queue.wait, asked.id, 60.0)
-            _say(ended, "The certificate is written.")
+            ended = await _done(bench, asked, "The certificate is written.", place)
             if ended.code == 0:
-                links.clear()
-                with links:
+                with place:
                     for file, words in (("certificate.xml", "XML"), ("certificate.html", "page")):
                         ui.link(
                             f"Certificate, {words}", f"/api/v1/jobs/{ended.id}/files/{file}", new_tab=True
-                        )
+                        ).classes("mr-4")
 
     button("Write the certificate", certify)
+    place = ui.element("div").classes("w-full")
+
+
+async def _done(bench: Bench, job: Job, words: str, place: ui.element) -> Job:
+    """A job once it has ended; how it has is told, and its command stands in ``place``."""
+    ended = await asyncio.to_thread(bench.queue.wait, job.id, 60.0)
+    _say(ended, words)
+    place.clear()
+    with place:
+        command(ended.command)
+    return ended
 
 
 def _say(job: Job, words: str) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 from nicegui import ui
 
+from inercal.records.places import counted
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import button, command, framed, heading, table, told
@@ -55,7 +58,7 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
     """The state of a job until it has ended."""
     begun = job.state in ENDED
     state = ui.label().classes("verdict").props('role="status" data-state="1"')
-    bar = ui.linear_progress(show_value=False).props('indeterminate aria-label="at work"')
+    bar = ui.linear_progress(show_value=False).props('aria-label="at work"')
     said = ui.label().classes("command")
     command(job.command)
     with ui.row():
@@ -66,9 +69,11 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
 
     def look() -> None:
         now = bench.queue.get(job.id)
-        state.set_text(
-            f"The job {WORDS[now.state]}" + (f": {now.progress}" if now.state is State.RUNNING else "")
-        )
+        progress = now.progress if now.state is State.RUNNING else ""
+        state.set_text(f"The job {_words(bench, now)}" + (f": {progress}" if progress else ""))
+        part = part_of(progress)
+        bar.props(remove="indeterminate") if part is not None else bar.props("indeterminate")
+        bar.set_value(part or 0.0)
         said.set_text(now.said)
         over = now.state in ENDED
         bar.set_visibility(not over)
@@ -80,6 +85,23 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
                 ui.navigate.to(f"/sessions/{session.id}/result")
 
     timer = ui.timer(_EVERY, look)
+
+
+def _words(bench: Bench, job: Job) -> str:
+    """The state of a job; where it waits, for how many."""
+    before = sum(each.state not in ENDED and each.id < job.id for each in bench.queue)
+    if job.state is State.WAITING and before:
+        return f"waits for {counted(before, 'job')} before it"
+    return WORDS[job.state]
+
+
+def part_of(progress: str) -> float | None:
+    """The part of the work that is done, where the words of its progress say so; else None."""
+    if match := re.search(r"(\d+) %", progress):
+        return min(int(match[1]) / 100.0, 1.0)
+    if match := re.search(r"(\d+) of (\d+)", progress):
+        return min(int(match[1]) / max(int(match[2]), 1), 1.0)
+    return None
 
 
 def _jobs(bench: Bench, session: Session) -> None:

@@ -12,8 +12,11 @@ from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.workbench.bench import KINDS, Bench
 from inercal.workbench.form import Key, Table, as_toml, changed, parsed, problem, tables
-from inercal.workbench.pages.frame import button, command, framed, heading, refused, told
+from inercal.workbench.pages.frame import button, command, copy, framed, heading, refused, saved, told
 from inercal.workbench.sessions import STUDY, Session, put
+
+_PAUSE = 400
+"""Pause in typing [ms] after which a study is judged; leaving the field ends it too."""
 
 _OPEN = "?"
 """Value of a key that is to be filled in."""
@@ -51,18 +54,22 @@ class Editor:
     def __init__(self, bench: Bench, session: Session) -> None:
         self.session = session
         self.text = read_bytes(session.folder / STUDY).decode(errors="replace")
-        self.verdict = ui.label().props('role="status" data-verdict="1"')
+        with ui.element("div").classes("judged"):  # in sight of every key
+            self.verdict = ui.label().props('role="status" data-verdict="1"')
         button("Run", lambda: self.run(bench), main=True)
         with told():
             command(shlex.join(["inercal", *session.command(Path("cal.json"), Path("cal.html"))]))
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
             self.form = ui.element("div")
-            with ui.element("div"):
+            with ui.element("div").classes("copies"):
                 heading("The study as text")
                 self.source = ui.textarea(value=self.text, on_change=lambda event: self.typed(event.value))
-                self.source.props('outlined autogrow debounce=400 aria-label="study as TOML"').classes(
+                self.source.props(f'outlined autogrow debounce={_PAUSE} aria-label="study as TOML"').classes(
                     "w-full command"
                 )
+                with ui.row().classes("items-center"):
+                    copy(f"copy {STUDY}")
+                    saved(session, STUDY)
         self.fill()
         self.judge()
 
@@ -164,11 +171,12 @@ def _switch(key: Key, change: Changed) -> None:
 
 def _typed(key: Key, change: Changed) -> None:
     """A text, a quantity with its unit, or a value of TOML."""
-    field = ui.input(label=key.name, value="" if key.value == _OPEN else key.value, placeholder=key.example)
-    field.props("dense outlined stack-label").classes("w-full")
+    field = ui.input(
+        label=key.name, value="" if key.value == _OPEN else key.value, placeholder=key.example,
+        on_change=lambda event: change(key, event.value or ""),
+    ).props(f"dense outlined stack-label debounce={_PAUSE}").classes("w-full")  # fmt: skip
     if key.value == _OPEN:
         field.props('hint="to be filled in"')
-    field.on("change", lambda: change(key, field.value))
 
 
 _WIDGETS: dict[str, Callable[[Key, Changed], None]] = {

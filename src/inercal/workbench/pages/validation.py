@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from inercal.workbench.bench import Bench
-from inercal.workbench.jobs import ENDED, Job
+from inercal.workbench.bench import VALIDATION, Bench
+from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import button, command, framed, report, told
 from inercal.workbench.pages.run import WORDS
-
-_SESSION = "validation"
 
 
 def add(bench: Bench) -> None:
@@ -18,12 +16,11 @@ def add(bench: Bench) -> None:
     @ui.page("/validation")
     def show() -> None:
         with framed("Validation"):
-            job = next((job for job in bench.queue if job.session == _SESSION), None)
+            job = next((job for job in bench.queue if job.session == VALIDATION), None)
 
             def begin() -> None:
                 with told():
-                    words = ["validate", "--out", "{out}/result.json", "--report", "{out}/report.html"]
-                    bench.queue.add(_SESSION, bench.root, words)
+                    bench.validate()
                     ui.navigate.reload()
 
             ui.label("Published and closed-form cases that ship with inercal, run on this machine.")
@@ -40,7 +37,8 @@ def _follow(bench: Bench, job: Job) -> None:
 
     def look() -> None:
         now = bench.queue.get(job.id)
-        state.set_text(f"Job {now.id} {WORDS[now.state]}")
+        progress = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
+        state.set_text(f"Job {now.id} {WORDS[now.state]}{progress}")
         if now.state not in ENDED:
             return
         timer.deactivate()
