@@ -105,7 +105,7 @@ def test_an_ordinary_ramp_is_nothing_to_be_said(ramp, measured, tmp_path):
     (tmp_path / "study.toml").write_text(platform.study())
     found = calibrate(read([tmp_path / "record.csv"]), load_selfcal_study(tmp_path / "study.toml")).estimate
     assert found.status is Status.OK
-    assert {finding.code for finding in found.findings} <= {"stated_exact", "at_prior"}
+    assert {finding.code for finding in found.findings} <= {"stated_exact", "at_prior", "considered"}
     assert not any(finding.harm for finding in found.findings)
 
 

@@ -7,7 +7,6 @@ import pytest
 import strapdown_faults as faults
 
 from inercal.findings import Status
-from inercal.strapdown.considered import second_moment
 
 DRIFT = faults.CASES["drift of a gyro by force, 1 deg/h/g"]
 PER_G = faults.DPH / 9.80665
@@ -15,22 +14,6 @@ PER_G = faults.DPH / 9.80665
 
 def told(estimate):
     return [each for each in estimate.findings if each.code == "considered"]
-
-
-def test_the_second_moment_is_that_of_a_weighted_sample():
-    rng = np.random.default_rng(20261124)
-    information = np.array([[3.0, 1.0], [1.0, 0.5]])
-    score, usual = np.array([2.5, 0.2]), 0.7
-    count = 400_000
-    size = usual * np.abs(rng.standard_cauchy(count))
-    effects = size[:, None] * rng.standard_normal((count, 2))
-    log = effects @ score - 0.5 * np.einsum("ka,ab,kb->k", effects, information, effects)
-    weight = np.exp(log - log.max())
-    weight /= weight.sum()
-    products = np.einsum("ka,kb->kab", effects, effects)
-    expected = np.einsum("k,kab->ab", weight, products)
-    u = np.sqrt(np.einsum("k,kab->ab", weight**2, (products - expected) ** 2))
-    assert np.all(np.abs(second_moment(score, information, usual) - expected) < 4.5 * u + 0.01 * usual**2)
 
 
 def test_a_unit_without_drifts_hardly_pays_for_them():

@@ -91,6 +91,9 @@ class Limits:
     """Time [s] over which a bias that walks is correlated: within it a random walk, beyond it as far from its mean as
     before. A walk of 0.35 ug/sqrt(s) is then like 1/f noise whose Allan deviation has its floor at 1 ug."""
 
+    considered_part: float = 0.5
+    """Part of u that errors of one kind which are not fitted must make to be told, over the u without any."""
+
     slow_time: float = 5.0
     """Time [s] over which innovations of accelerometers are correlated where their biases wander and no state of the
     model follows: slower wandering is taken up by coefficients."""

@@ -55,6 +55,9 @@ _ROUNDS = 8
 _NEAR = 0.02
 """Part of u that the last step may be."""
 
+_OF_ONE = ("at_prior", "goal_missed", "stated_exact", "considered")
+"""Findings of a record alone that need not hold for all together."""
+
 
 @short_repr
 @dataclass(frozen=True, eq=False)
@@ -231,9 +234,7 @@ def _assembled(
     judged = observability(PathBounds(fit.names, by_records, fit.prior, np.empty((0, len(u)))), settings.goal)
     findings = list[Finding]()
     for part, each in zip(parts, alone, strict=True):
-        told = (
-            f for f in each.estimate.findings if f.code not in ("at_prior", "goal_missed", "stated_exact")
-        )
+        told = (f for f in each.estimate.findings if f.code not in _OF_ONE)
         findings += [replace(f, message=f"{part.name}: {f.message}") for f in told]
     ratio = dict(zip(fit.names, judged.learned.ratio, strict=True))
     findings += [

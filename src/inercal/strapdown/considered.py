@@ -15,6 +15,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeB
+from inercal.estimate.effects import second_moment
 from inercal.findings import Finding
 from inercal.records.places import counted_names
 from inercal.strapdown.left_out import Tested
@@ -41,22 +42,6 @@ def usual_size(settings: StrapdownSettings) -> float:
     if TERM in settings.given.get("prior", {}):
         return float(settings.prior.g_sensitivity)
     return float(LIMITS.usual_drift * settings.prior.gyro_bias / STANDARD_GRAVITY)
-
-
-def second_moment(score: Array, information: Array, usual: float) -> Array:
-    """Second moment (q, q) of effects about 0, of a record with their ``score`` (q,) and ``information`` (q, q), its
-    alone; all are normal of one size, and that is Cauchy distributed beyond 0, with the median ``usual``."""
-    eigenvalues, axes = np.linalg.eigh(information)
-    along, count = axes.T @ score, LIMITS.sizes
-    # equal shares of the distribution, each by its median
-    variance = np.square(usual * np.tan(0.5 * math.pi * (np.arange(count) + 0.5) / count))[:, None]
-    gain = 1.0 + variance * np.maximum(eigenvalues, 0.0)
-    likelihood = 0.5 * np.sum(variance * along**2 / gain - np.log(gain), axis=1)
-    weight = np.exp(likelihood - likelihood.max())
-    weight /= weight.sum()
-    mean = variance * along / gain
-    moment = np.einsum("k,ka,kb->ab", weight, mean, mean) + np.diag(weight @ (variance / gain))
-    return np.asarray(axes @ moment @ axes.T)
 
 
 def considered(

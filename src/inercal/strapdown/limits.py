@@ -121,9 +121,6 @@ class Limits:
     """Usual drift of gyros by one g, over the standard deviation of their biases: cheap ones have 3 deg/s and 0.1 deg/s
     for each g, those of tactical grade 30 deg/h and 1 deg/h."""
 
-    sizes: int = 200
-    """Sizes of drifts by specific force that are averaged over."""
-
     considered_part: float = 0.5
     """Part of u that an effect which is not fitted must make to be told, over the u without it."""
 

@@ -92,9 +92,21 @@ def innovation_slopes(
 ) -> Array:
     """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities`
     has those of the estimates; 0 where nothing was measured."""
+    return both(recording, problem, attitudes, coefficients, names, restarts)[0]
+
+
+def both(
+    recording: Recording,
+    problem: FilterProblem,
+    attitudes: Array,
+    coefficients: Array,
+    names: Sequence[str],
+    restarts: Sequence[int],
+) -> tuple[Array, Array]:
+    """`innovation_slopes` (n - 1, 6, m) and `sensitivities` (p, m), in one run."""
     slopes = np.zeros((len(recording.t), 6, len(names)))
-    _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
-    return slopes[1:]
+    S = _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
+    return slopes[1:], -S[3:]
 
 
 def _carried(

@@ -16,8 +16,8 @@ from inercal.selfcal.limits import LIMITS
 
 
 def stated_variance(filtered: FilterResult, u: Array) -> Array:
-    """Variance (p,) that what is stated with an uncertainty adds to that of the estimator that counts, by the
-    uncertainties ``u`` (p,) of the result; product form."""
+    """Variance (p,) that what is stated with an uncertainty, or not fitted, adds to that of the estimator that counts,
+    by the uncertainties ``u`` (p,) of the result; product form."""
     _, own = product_form(filtered)
     return np.asarray(np.maximum(np.square(u) - np.square(own), 0.0))
 

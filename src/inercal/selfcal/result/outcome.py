@@ -31,6 +31,8 @@ from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
 from inercal.selfcal.result.budget import considered, systematic, within
+from inercal.selfcal.result.not_fitted import SOURCE as NOT_FITTED
+from inercal.selfcal.result.not_fitted import not_fitted
 from inercal.selfcal.result.systematic import stated_errors
 from inercal.selfcal.settings import SelfcalSettings
 
@@ -107,6 +109,10 @@ def assemble(
     of_site, exact = systematic(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise.of_readings, max(dof, 1.0)), *of_site, *of_rig]
+    rest = not_fitted(recording, settings, filtered, combine(filtered.names, sources).u)
+    if rest is not None:
+        sources.append(rest.source)
+        left_out = {kind: text for kind, text in left_out.items() if kind not in rest.counted}
     uncertainty = combine(filtered.names, sources)
     if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
@@ -147,6 +153,8 @@ def assemble(
                 f"{', '.join(left_out.values())}; name them in states under [model], or state them with uncertainties"
             )
             all_findings.append(Finding("stated_exact", text))
+        if rest is not None and rest.finding is not None:
+            all_findings.append(rest.finding)
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
     if status is Status.OK and lost:
         status = Status.UNOBSERVABLE
@@ -296,7 +304,8 @@ def _hidden(
     for name, left in zip(judged.learned.names, ratio, strict=True):
         if left > HALF_SEEN and name not in judged.at_prior and KIND_OF[name] not in BIAS_WALK:
             source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
-            why = f"what is stated of {source} leaves {100.0 * left:.0f} % of its prior uncertain"
+            what = f"{source} leave" if source == NOT_FITTED else f"what is stated of {source} leaves"
+            why = f"{what} {100.0 * left:.0f} % of its prior uncertain"
             hidden[name] = (float(left), why)
     return hidden
 

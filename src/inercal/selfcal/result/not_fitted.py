@@ -1,0 +1,176 @@
+"""Errors of the rig that are neither states nor stated: what this recording leaves of them, in u.
+
+A K2, a harmonic or a bias that wanders may shift coefficients by several u before any test finds it. Each is as large
+as usual, or smaller where the innovations say so (`inercal.estimate.effects`): score and information follow from the
+columns that the errors would have as states. Only where the states are those of a rig: a model of the literature is
+taken at its word, and a finding says what that leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.arrays import Array
+from inercal.estimate.budget import TypeB
+from inercal.estimate.effects import joint_second_moment
+from inercal.findings import Finding
+from inercal.instruments.terms import shown_unit
+from inercal.records.places import counted_names
+from inercal.selfcal.before.considered import both
+from inercal.selfcal.diagnosis.fit_quality import Case, filtered, regular
+from inercal.selfcal.filters.averaged import averaged
+from inercal.selfcal.filters.filter_result import FilterResult
+from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.coefficients import product_slope
+from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.states import (
+    ALL,
+    BIAS_WALK,
+    KIND_OF,
+    RIG,
+    STATES,
+    TEMPERATURE,
+    UNIT_OF,
+    WALK,
+    WAVE,
+)
+from inercal.selfcal.settings import SelfcalSettings
+
+SOURCE = "errors of the rig that are not fitted"
+
+_WANDERS = {"gyro_walk": "kg0_T1", "accelerometer_walk": "ka0_T1"}
+"""Kind of a walk -> that of which the columns, with a course of time in the place of temperature, are its own."""
+
+
+class NotFitted(NamedTuple):
+    """Kinds of errors that are not fitted but ``counted`` in u, as states and studies call them, what they add to the
+    budget, and the finding that tells of them, None where that is little."""
+
+    counted: tuple[str, ...]
+    source: TypeB
+    finding: Finding | None
+
+
+class _Effects(NamedTuple):
+    """Errors: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual`` (q,) sizes [SI]; per usual
+    size the change of the m normalised ``innovations`` (m, q) that count and of the coefficients, ``shift`` (p, q)."""
+
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    usual: Array
+    innovations: Array
+    shift: Array
+
+
+def not_fitted(
+    recording: Recording, settings: SelfcalSettings, result: FilterResult, u: Array
+) -> NotFitted | None:
+    """Errors that are not fitted by the ``result`` of a filter, whose coefficients have ``u`` (p,) without them; None
+    where the states are not those of a rig, or where no error is left."""
+    if not {*RIG} <= {*settings.kinds}:
+        return None
+    case = averaged(recording, problem(settings), result)
+    now = filtered(case)
+    if not now.converged:
+        return None
+    parts = [
+        each for each in (_constant(case, now, settings), *_wandering(case, now, settings)) if each.names
+    ]
+    if not parts:
+        return None
+    found = _Effects(
+        tuple(kind for each in parts for kind in each.kinds),
+        tuple(name for each in parts for name in each.names),
+        np.concatenate([each.usual for each in parts]),
+        np.concatenate([each.innovations for each in parts], axis=1),
+        np.concatenate([each.shift for each in parts], axis=1),
+    )
+    counted = tuple(dict.fromkeys(found.kinds))
+    z, columns = regular(case[0], now), found.innovations
+    kinds = np.array([counted.index(kind) for kind in found.kinds])
+    moment = joint_second_moment(columns.T @ z[np.isfinite(z)], columns.T @ columns, kinds)
+    eigenvalues, axes = np.linalg.eigh(moment)
+    shift = product_slope(result.coefficients) @ found.shift
+    source = TypeB(SOURCE, 1.0, "1", shift @ axes * np.sqrt(np.maximum(eigenvalues, 0.0)))
+    left = np.sqrt(np.diag(moment))
+    raised, told = np.zeros(len(u), dtype=bool), list[str]()
+    for kind in counted:
+        own = np.array([each == kind for each in found.kinds])
+        more = np.sqrt(
+            np.maximum(np.einsum("ia,ab,ib->i", shift[:, own], moment[np.ix_(own, own)], shift[:, own]), 0.0)
+        )
+        if (more > LIMITS.considered_part * u).any():
+            raised |= more > LIMITS.considered_part * u
+            told.append(_words(kind, found, own, left))
+    names = [name for name, by in zip(result.names, raised.tolist(), strict=True) if by]
+    walks = ("bias_walk",) if {*BIAS_WALK} & {*counted} else ()
+    return NotFitted((*counted, *walks), source, _told(told, names) if names else None)
+
+
+def _constant(case: Case, now: FilterResult, settings: SelfcalSettings) -> _Effects:
+    """Errors that do not change with time."""
+    recording, of = case
+    known = {*of.names, *settings.model.left_out, *settings.model.stated}
+    warm = recording.warm is not None and np.ptp(recording.warm) > 0.0
+    named = ALL[18 : WAVE + 2 * len(of.states.harmonics)]
+    names = [name for name in named if name not in known and (warm or KIND_OF[name] not in TEMPERATURE)]
+    usual = settings.priors[[ALL.index(name) for name in names]]
+    return _of_names(case, now, names, [KIND_OF[name] for name in names], usual)
+
+
+def _wandering(case: Case, now: FilterResult, settings: SelfcalSettings) -> list[_Effects]:
+    """Biases that wander about their means: of the walks that are stated, exponentially correlated (A. Gelb, Applied
+    Optimal Estimation, 1974, section 3.8), the mean over this recording and cosines of time. None where these are
+    states, or where temperature is, by which biases change then."""
+    recording, of = case
+    walks = [kind for kind in BIAS_WALK if f"{_WANDERS[kind][:3]}_walk_x" not in of.names]
+    if not walks or any(ALL.index(name) < WALK and KIND_OF[name] in TEMPERATURE for name in of.names):
+        return []
+    names = [name for kind in walks for name in STATES[_WANDERS[kind]].parameters]
+    kinds = [kind for kind in walks for _ in range(3)]
+    sigma = settings.priors[[ALL.index(name) for kind in walks for name in STATES[kind].parameters]]
+    lasts = float(recording.t[-1] - recording.t[0])
+    through, ratio = (recording.t - recording.t[0]) / lasts, LIMITS.walk_time / lasts
+    waves = []
+    for j in range(LIMITS.wandering + 1):
+        course = replace(recording, warm=np.cos(j * math.pi * through)), of
+        # spectrum of the process at half periods over the recording; that of a mean is half of it
+        part = math.sqrt(min((4.0 if j else 2.0) * ratio / (1.0 + (j * math.pi * ratio) ** 2), 1.0))
+        waves.append(_of_names(course, now, names, kinds, part * sigma))
+    return waves
+
+
+def _of_names(
+    case: Case, now: FilterResult, names: Sequence[str], kinds: Sequence[str], usual: Array
+) -> _Effects:
+    """Errors of some names, of usual sizes."""
+    recording, of = case
+    assert now.history is not None
+    innovations, shift = both(recording, of, now.history.attitude, now.coefficients, names, now.restarts)
+    there = np.isfinite(regular(recording, now))
+    return _Effects(tuple(kinds), tuple(names), usual, innovations[there] * usual, shift * usual)
+
+
+def _words(kind: str, found: _Effects, own: Array, left: Array) -> str:
+    """How much of a kind is left, in words."""
+    worst = int(np.flatnonzero(own)[np.argmax(left[own])])
+    name = found.names[worst]
+    if kind in BIAS_WALK:
+        return f"{left[worst]:.2g} times {kind}"
+    unit, size = shown_unit(UNIT_OF[name])
+    return f"{left[worst] * found.usual[worst] / size:.2g} {unit} of {name} ({found.usual[worst] / size:.3g} usual)"
+
+
+def _told(left: Sequence[str], names: Sequence[str]) -> Finding:
+    """The finding that tells what errors which are not fitted do to u."""
+    return Finding(
+        "considered",
+        f"errors of the rig that are no states count in u of {counted_names(names, 6)}, as large as usual or as this "
+        f"recording leaves them: up to {', '.join(left)}; name them in states under [model], or state them there",
+    )
