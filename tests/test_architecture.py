@@ -156,7 +156,7 @@ WITHIN = {
     ),
     "strapdown": (
         "limits coefficients settings kernels delay samples arrow simulate rests start batch error_state bounds "
-        "path_search design foresight budget left_out considered restricted reading outcome task figures"
+        "path_search design foresight left_out considered restricted averaged budget reading outcome task figures"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "

@@ -10,8 +10,9 @@ from scipy.stats import chi2
 
 import inercal as ic
 from inercal.findings import Status
+from inercal.strapdown.averaged import opened
 from inercal.strapdown.batch import fit
-from inercal.strapdown.restricted import solved, with_noise
+from inercal.strapdown.restricted import separated, solved, with_noise
 from inercal.strapdown.rests import found_rests, nodes_of
 from inercal.strapdown.settings import TURN_NOISE, WALKS
 from inercal.strapdown.simulate import simulated, to_record
@@ -91,6 +92,27 @@ def test_walks_are_found():
     found = with_noise(samples, nodes, settings, fit(samples, nodes, settings), WALKS)
     assert found.noise.gyro_walk == pytest.approx(MEMS.noise.gyro_walk, rel=0.35)
     assert found.noise.accelerometer_walk < 4.0 * MEMS.noise.accelerometer_walk
+
+
+def test_what_the_size_of_a_walk_leaves_open_is_in_u():
+    """Against a sum over two hundred sizes up to where none is likely; the likeliest alone knows too much."""
+    samples, nodes = run(MEMS, 4)
+    settings = without(MEMS, "gyro_walk")
+    found = with_noise(samples, nodes, settings, fit(samples, nodes, settings), ("gyro_walk",))
+    shown = replace(settings, noise=replace(found.noise, estimate=("gyro_walk",)))
+    fixed, (part,), _ = separated(found.fit, samples, shown, ("gyro_walk",))
+    tried = []
+    for size in np.linspace(0.01, 4.0, 200) * MEMS.noise.gyro_walk:
+        chain = found.fit.chain._replace(W=np.linalg.inv(fixed + size**2 * part))
+        tried.append(solved(chain, found.fit.prior))
+    weight = np.exp(
+        -0.5 * (np.array([each.deviance for each in tried]) - min(each.deviance for each in tried))
+    )
+    moments = [each.covariance + np.outer(each.step, each.step) for each in tried]
+    likely = np.einsum("k,kab->ab", weight / weight.sum(), moments)
+    told = found.fit.covariance + opened(found.fit, samples, shown)
+    assert np.sqrt(np.diag(told)) == pytest.approx(np.sqrt(np.diag(likely)), rel=0.02)
+    assert np.all(np.diag(told) > np.diag(found.fit.covariance))
 
 
 def named(case):

@@ -2,7 +2,8 @@
 
 Each coefficient is a sum of all rows of the last linear problem, each row times its gain: the covariance of the
 coefficients with what the solution says of the row, times the row's information. What a source adds to the covariance
-is that of its part of the rows; all parts together are the whole.
+is that of its part of the rows; all parts together are the whole. Noise that was found from the recording adds what its
+size leaves open.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA, TypeB
+from inercal.strapdown.averaged import opened
 from inercal.strapdown.batch import Fit, interval_covariance, variances_of
 from inercal.strapdown.coefficients import GRAVITY, LATITUDE
 from inercal.strapdown.samples import Samples
@@ -35,6 +37,11 @@ def sources(fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Arra
         if u > 0.0:
             of_one = interval_covariance(fit, samples, settings, np.eye(6)[k] * variances[k])
             parts.append(TypeA(name, u, unit, np.einsum("kqa,kab,krb->qr", gain, of_one, gain), dof))
+    if noise.estimate:
+        more = slope @ opened(fit, samples, settings) @ slope.T
+        parts.append(
+            TypeA("noise found from the recording, as far as that leaves it open", 1.0, "1", more, dof)
+        )
     chain, m = fit.chain, fit.chain.F.shape[1]
     nodes = np.einsum("qp,kap->qka", slope, fit.said.nodes)
     rows = nodes[:, :, 3:6]

@@ -48,7 +48,7 @@ class Limits:
     """Angle [rad] at most by which the unit turns in such a block."""
 
     start_tilt: float = math.radians(1.0)
-    """Standard deviation [rad] of the first attitude about level axes."""
+    """Standard deviation [rad] of the first attitude about level axes, without what biases do to it."""
 
     start_heading: float = math.radians(5.0)
     """The same about the vertical where it was found from earth rate."""
@@ -96,8 +96,17 @@ class Limits:
     noise_rounds: int = 6
     """Fits at most while noise is estimated."""
 
-    noise_step: float = 0.1
-    """Relative change of a variance between them, below which they end."""
+    noise_gain: float = 0.01
+    """Fall of -2 ln L by a round of them, below which they end."""
+
+    least_noise: float = 0.01
+    """Part of the noise that estimation begins with, below which it counts as this."""
+
+    noise_sizes: int = 12
+    """Sizes of noise that was found that are averaged over."""
+
+    unlikely: float = 10.0
+    """Fall of 2 ln L from which on a size of noise does not count."""
 
     walk_start: float = 30.0
     """Time [s] in which a walk that is estimated begins as large as white noise."""

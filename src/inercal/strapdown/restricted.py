@@ -41,13 +41,15 @@ _PLACES = {"gyro_walk": 2, "accelerometer_walk": 3, "turn_attitude": 4, "turn_ve
 
 class Solved(NamedTuple):
     """A linear problem solved: sum of ``squares`` with those of the prior, ``deviance`` -2 ln L but for a constant,
-    residuals ``left`` (k, m) of the intervals, and covariance ``followed`` (k, m, m) of what the solution says of
-    them."""
+    residuals ``left`` (k, m) of the intervals, ``rows`` (k + 1, m + 3, n) of the elimination, ``covariance`` (p, p) and
+    ``step`` (p,) of the coefficients."""
 
     squares: float
     deviance: float
     left: Array
-    followed: Array
+    rows: Array
+    covariance: Array
+    step: Array
 
 
 def solved(chain: Chain, prior: Array) -> Solved:
@@ -69,37 +71,54 @@ def solved(chain: Chain, prior: Array) -> Solved:
     ends = np.append(np.diff(chain.rest) != 0, True) & (chain.attitude > 0.0)
     volume = np.sum(np.log(pivots[:, :m])) + np.sum(np.log(pivots[ends, m:]))
     volume += np.linalg.slogdet(information * np.outer(prior, prior))[1] - np.linalg.slogdet(chain.W)[1].sum()
-    said = followed_by(chain, rows, covariance)
     total = float(squares + velocity + attitude + known)
-    return Solved(total, total + float(volume), left, said.out)
+    return Solved(total, total + float(volume), left, rows, covariance, step)
 
 
-def _scored(fit: Fit, fixed: Array, parts: Array, s: Array) -> tuple[Array, float]:
-    """Variances of largest likelihood, from ``s`` (q,) on, of the ``parts`` (q, k, m, m) of the covariance beside what
-    is ``fixed`` (k, m, m), and the deviance there."""
-    least, deviance, factor = 1e-8 * s, np.inf, 1.0
-    kept = s
+def separated(
+    fit: Fit, samples: Samples, settings: StrapdownSettings, names: tuple[str, ...]
+) -> tuple[Array, Array, Array]:
+    """Of the covariance of intervals what is not of the ``names`` (k, m, m), what each of these adds for a variance of
+    1 (q, k, m, m), and their variances (q,)."""
+    places = [_PLACES[name] for name in names]
+    variances = variances_of(settings.noise)
+    fixed = variances.copy()
+    fixed[places] = 0.0
+    of_others, *parts = (
+        interval_covariance(fit, samples, settings, each) for each in (fixed, *np.eye(6)[places])
+    )
+    return of_others, np.stack(parts), variances[places]
+
+
+def _scored(fit: Fit, fixed: Array, parts: Array, s: Array, least: Array) -> tuple[Array, float, float]:
+    """Variances of largest likelihood, from ``s`` (q,) on and not below ``least`` (q,), of the ``parts`` (q, k, m, m)
+    of the covariance beside what is ``fixed`` (k, m, m), the deviance there, and by how much it fell."""
+    first = deviance = np.inf
+    kept, part = s, 1.0
     for _ in range(LIMITS.scoring):
         W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", s, parts)))
         now = solved(fit.chain._replace(W=W), fit.prior)
-        if now.deviance > deviance + 1e-6:  # the step was too long
-            factor *= 0.5
-            s = np.exp(np.log(kept) + 0.5 * (np.log(s) - np.log(kept)))
-            if factor < 1e-2:
+        if now.deviance > deviance + 1e-6:  # the step was too long, and so will be the next
+            part *= 0.5
+            s = np.sqrt(kept * s)
+            if part < 1e-3:
                 break
             continue
-        gain, deviance, kept, factor = deviance - now.deviance, now.deviance, s, 1.0
+        gain, deviance, kept, part = deviance - now.deviance, now.deviance, s, min(2.0 * part, 1.0)
+        first = deviance if first == np.inf else first
         if gain < LIMITS.scoring_gain:
             break
-        M = W - W @ now.followed @ W
+        M = W - W @ followed_by(fit.chain._replace(W=W), now.rows, now.covariance).out @ W
         weighted = np.einsum("kab,kb->ka", W, now.left)
         of_data = np.einsum("ka,qkab,kb->q", weighted, parts, weighted)
         through = np.einsum("kab,qkbc->qkac", M, parts)
         slope = 0.5 * (of_data - np.einsum("qkaa->q", through))
         curvature = 0.5 * np.einsum("pkab,qkba->pq", through, through)
-        step = np.linalg.lstsq(curvature, slope, rcond=1e-10)[0]
+        step = part * np.linalg.lstsq(curvature, slope, rcond=1e-10)[0]
         s = np.clip(np.maximum(s + step, 0.1 * s), least, 30.0 * s)
-    return kept, float(deviance)
+        if 2.0 * slope @ (s - kept) < LIMITS.scoring_gain:
+            break
+    return kept, float(deviance), float(first - deviance)
 
 
 class Found(NamedTuple):
@@ -147,21 +166,17 @@ def _iterated(
 ) -> Found | None:
     """The noise, of fits and linear problems in turns; raises `numpy.linalg.LinAlgError` where a matrix is singular."""
     noise, deviance = _started(settings.noise, names, LIMITS.walk_start), 0.0
-    places, before = [_PLACES[name] for name in names], solved(fitted.chain, fitted.prior).deviance
-    for _ in range(LIMITS.noise_rounds):
+    least = LIMITS.least_noise**2 * variances_of(noise)[[_PLACES[name] for name in names]]
+    before = solved(fitted.chain, fitted.prior).deviance
+    for left in reversed(range(LIMITS.noise_rounds)):
         now = replace(settings, noise=noise)
         again = fit(samples, nodes, now, fitted)
         if again is None:
             return None
         fitted = again
-        variances = variances_of(noise)
-        s, fixed = variances[places], variances.copy()
-        fixed[places] = 0.0
-        of_others, *parts = (
-            interval_covariance(fitted, samples, now, each) for each in (fixed, *np.eye(6)[places])
-        )
-        found, deviance = _scored(fitted, of_others, np.stack(parts), s)
-        if np.all(np.abs(np.log(found / s)) < LIMITS.noise_step):
+        fixed, parts, s = separated(fitted, samples, now, names)
+        found, deviance, gained = _scored(fitted, fixed, parts, s, least)
+        if not left or gained < LIMITS.noise_gain:
             break
         noise = _changed(noise, dict(zip(names, np.sqrt(found).tolist(), strict=True)))
     return Found(noise, before - deviance, fitted)
@@ -170,7 +185,8 @@ def _iterated(
 def with_noise_shown(
     samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit
 ) -> tuple[StrapdownSettings, Fit]:
-    """The study with the noise that it leaves to the recording, and the fit with that.
+    """The study with the noise that it leaves to the recording, of which ``estimate`` then names what was found, and
+    the fit with that.
 
     Walks are estimated where the study asks for it; what turns add, where they leave too much, unless an effect outside
     the model that `left_out` knows, or a prior that cannot be, explains more of it.
@@ -181,11 +197,11 @@ def with_noise_shown(
     if turns > LIMITS.turn_excess:
         names += [name for name in TURN_NOISE if name in asked]
     found = with_noise(samples, nodes, settings, fitted, tuple(names)) if names else None
+    if found and not found.noise.walks and max(_of_others(fitted, settings)) > found.gain:
+        found = None
     if found is None:
-        return settings, fitted
-    if not found.noise.walks and max(_of_others(fitted, settings)) > found.gain:
-        return settings, fitted
-    return replace(settings, noise=found.noise), found.fit
+        return replace(settings, noise=replace(settings.noise, estimate=())), fitted
+    return replace(settings, noise=replace(found.noise, estimate=tuple(names))), found.fit
 
 
 def _of_others(fitted: Fit, settings: StrapdownSettings) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples
 from inercal.strapdown.settings import StrapdownSettings
+from inercal.units import STANDARD_GRAVITY
 
 
 class Beginning(NamedTuple):
@@ -53,8 +55,10 @@ def by_compass(settings: StrapdownSettings) -> bool:
 
 
 def start_u(settings: StrapdownSettings) -> Array:
-    """Standard deviations (3,) [rad] of the attitude at the start about east, north, up."""
-    tilt, start = LIMITS.start_tilt, settings.start
+    """Standard deviations (3,) [rad] of the attitude at the start about east, north, up; level is found by
+    accelerometers whose biases are not known yet."""
+    start = settings.start
+    tilt = math.hypot(LIMITS.start_tilt, settings.prior.bias / STANDARD_GRAVITY)
     return np.array([tilt, tilt, LIMITS.start_heading if by_compass(settings) else start.heading_u])
 
 
