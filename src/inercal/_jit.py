@@ -12,7 +12,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -69,31 +69,21 @@ def cache_folder() -> Path | None:
 
 def kernel(function: F) -> F:
     """Compile a function with numba (nopython, no GIL, no fastmath), cached on disk where possible."""
+    return _compiled(function, "never")
+
+
+def inlined(function: F) -> F:
+    """A kernel for one or two others, into which it is put: they compile sooner than with it beside them."""
+    return _compiled(function, "always")
+
+
+def _compiled(function: F, inline: str) -> F:
+    """The function as numba compiles it when it is first called."""
     folder = cache_folder()
     config = cast(Any, numba.core.config)
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
     try:
-        return cast(F, numba.njit(nogil=True, cache=folder is not None)(function))
+        return cast(F, numba.njit(nogil=True, cache=folder is not None, inline=inline)(function))
     finally:
         config.CACHE_DIR = before
-
-
-def compiled(kernel: F, *arguments: Any) -> F:
-    """The machine code of a kernel for arguments of these types: calling it skips the look at their types, several
-    microseconds for NamedTuples of arrays; the caller keeps to the types."""
-    compile_for = getattr(kernel, "compile", None)  # none where compiling is turned off
-    return kernel if compile_for is None else cast(F, compile_for(tuple(map(numba.typeof, arguments))))
-
-
-@contextmanager
-def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
-    """Surround the tiny first calls of a system's kernels; says so once when they must be compiled."""
-    folder = cache_folder()
-    done = None if folder is None else folder / f"{name}.compiled"
-    if done is None or not done.exists():
-        say("compiling kernels, once")
-    yield
-    if done is not None:
-        with suppress(OSError):  # it would be said once more
-            done.touch()
