@@ -12,7 +12,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -87,3 +87,23 @@ def _compiled(function: F, inline: str) -> F:
         return cast(F, numba.njit(nogil=True, cache=folder is not None, inline=inline)(function))
     finally:
         config.CACHE_DIR = before
+
+
+def compiled(kernel: F, *arguments: Any) -> F:
+    """The machine code of a kernel for arguments of these types: calling it skips the look at their types, several
+    microseconds for NamedTuples of arrays; the caller keeps to the types."""
+    compile_for = getattr(kernel, "compile", None)  # none where compiling is turned off
+    return kernel if compile_for is None else cast(F, compile_for(tuple(map(numba.typeof, arguments))))
+
+
+@contextmanager
+def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
+    """Surround the tiny first calls of a system's kernels; says so once when they must be compiled."""
+    folder = cache_folder()
+    done = None if folder is None else folder / f"{name}.compiled"
+    if done is None or not done.exists():
+        say("compiling kernels, once")
+    yield
+    if done is not None:
+        with suppress(OSError):  # it would be said once more
+            done.touch()
