@@ -69,12 +69,22 @@ def cache_folder() -> Path | None:
 
 def kernel(function: F) -> F:
     """Compile a function with numba (nopython, no GIL, no fastmath), cached on disk where possible."""
+    return _compiled(function, "never")
+
+
+def inlined(function: F) -> F:
+    """A kernel for one or two others, into which it is put: they compile sooner than with it beside them."""
+    return _compiled(function, "always")
+
+
+def _compiled(function: F, inline: str) -> F:
+    """The function as numba compiles it when it is first called."""
     folder = cache_folder()
     config = cast(Any, numba.core.config)
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
     try:
-        return cast(F, numba.njit(nogil=True, cache=folder is not None)(function))
+        return cast(F, numba.njit(nogil=True, cache=folder is not None, inline=inline)(function))
     finally:
         config.CACHE_DIR = before
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import inlined, kernel
 from inercal.arrays import Array
 
 
@@ -40,7 +40,7 @@ class Chain(NamedTuple):
     c: Array
 
 
-@kernel
+@inlined
 def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
     """Eliminate the first ``count`` unknowns from H x = g, in place; ``gone`` is used up. Of H only the upper triangle
     is used."""
@@ -55,7 +55,7 @@ def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
                     H[j, k] -= by * H[i, k]
 
 
-@kernel
+@inlined
 def add_interval(
     F: Array, G: Array, e: Array, W: Array, H: Array, g: Array, row: Array, weighted: Array
 ) -> None:
@@ -83,7 +83,7 @@ def add_interval(
                     H[j, i] += row[a, j] * weighted[a, i]
 
 
-@kernel
+@inlined
 def add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, H: Array, g: Array) -> None:
     """Add the rows of a node to H and g, of its velocity ``v`` (3,) and its ``angles`` (3,), each with its
     information."""
@@ -98,7 +98,7 @@ def add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, 
         g[b] += attitude * angles[i]
 
 
-@kernel
+@inlined
 def cleared(H: Array, g: Array, begin: int, end: int) -> None:
     """Forget what H and g say of the unknowns from ``begin`` to below ``end``."""
     for i in range(begin, end):
@@ -107,7 +107,7 @@ def cleared(H: Array, g: Array, begin: int, end: int) -> None:
             H[i, j] = H[j, i] = 0.0
 
 
-@kernel
+@inlined
 def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
     """Put the next node in the place of the one that was eliminated, with its angles where the rest ``ends``."""
     n, by = len(g), m + 3
@@ -124,7 +124,7 @@ def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
     cleared(H, g, by, by + m)
 
 
-@kernel
+@inlined
 def begun(start: Array, begin: Array, prior: Array, c: Array, H: Array, g: Array) -> None:
     """Set H and g to what is known beforehand of the first node and of the coefficients, as in `Chain`."""
     n, p = len(g), len(c)
@@ -139,7 +139,7 @@ def begun(start: Array, begin: Array, prior: Array, c: Array, H: Array, g: Array
         H[at, at], g[at] = prior[i], -prior[i] * c[i]
 
 
-@kernel
+@inlined
 def kept(H: Array, g: Array, rows: Array, right: Array) -> None:
     """Copy the first rows of H and g to ``rows`` and ``right``."""
     for i in range(len(right)):
@@ -148,12 +148,19 @@ def kept(H: Array, g: Array, rows: Array, right: Array) -> None:
             rows[i, j] = H[i, j]
 
 
-@kernel
 def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None:
     """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
     (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
+    m, n = chain.F.shape[1], len(g)
+    eliminate_all(chain, H, g, rows, right, np.empty(n), np.empty((m, n)), np.empty((m, n)))
+
+
+@kernel
+def eliminate_all(
+    chain: Chain, H: Array, g: Array, rows: Array, right: Array, gone: Array, row: Array, weighted: Array
+) -> None:
+    """Eliminate all nodes as in `forward`; ``gone`` (n,), ``row`` and ``weighted`` (m, n) are used up."""
     m, n, count = chain.F.shape[1], len(g), len(chain.rest)
-    gone, row, weighted = np.empty(n), np.empty((m, n)), np.empty((m, n))
     begun(chain.start, chain.begin, chain.prior, chain.c, H, g)
     for k in range(count):
         ends = k == count - 1 or chain.rest[k + 1] != chain.rest[k]
@@ -167,13 +174,19 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
         moved_on(H, g, m, ends)
 
 
-@kernel
 def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array) -> None:
     """Errors ``x`` (k + 1, m) of the nodes, and ``angles`` (k + 1, 3) of the references, of those of the coefficients
     ``c`` (p,)."""
+    put_back(rest, rows, right, c, x, angles, np.empty(rows.shape[2]))
+
+
+@kernel
+def put_back(
+    rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array, z: Array
+) -> None:
+    """Put errors back into the rows as in `backward`; ``z`` (n,) is used up."""
     m = x.shape[1]
     n = rows.shape[2]
-    z = np.empty(n)
     for k in range(len(rest) - 1, -1, -1):
         last = k == len(rest) - 1
         ends = last or rest[k + 1] != rest[k]
@@ -196,7 +209,7 @@ def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Ar
             angles[k, i] = z[m + i]
 
 
-@kernel
+@inlined
 def completed(row: Array, i: int, Z: Array) -> None:
     """Covariances ``Z`` (n, n) of unknown i with those behind it, of its ``row`` (n,) at elimination."""
     n = len(row)
@@ -211,7 +224,7 @@ def completed(row: Array, i: int, Z: Array) -> None:
     Z[i, i] = total / row[i]
 
 
-@kernel
+@inlined
 def explained(F: Array, G: Array, Z: Array, row: Array, out: Array, coupled: Array) -> None:
     """Covariance ``out`` (m, m) of what the unknowns of covariance ``Z`` (n, n) say of an interval of ``F`` (m, m) and
     ``G`` (m, p), A Z A^T, and that ``coupled`` (m, p) with the coefficients, A Z."""
@@ -236,21 +249,28 @@ def explained(F: Array, G: Array, Z: Array, row: Array, out: Array, coupled: Arr
             coupled[b, i] = row[2 * m + 3 + i]
 
 
-@kernel
 def followed(chain: Chain, rows: Array, Z: Array, out: Array, coupled: Array, nodes: Array) -> None:
     """Covariance ``out`` (k, m, m) of what the solution says of each interval, and with the coefficients that of each
     interval ``coupled`` (k, m, p) and of each node and the reference of its rest ``nodes`` (k + 1, m + 3, p); ``Z``
     (n, n) begins with the covariance (p, p) of the coefficients at its end and zeros before."""
-    m, n = chain.F.shape[1], len(Z)
-    row = np.empty(n)
-    for k in range(len(chain.rest) - 1, -1, -1):
-        last = k == len(chain.rest) - 1
-        ends = last or chain.rest[k + 1] != chain.rest[k]
-        first = m + 2 if ends and chain.attitude > 0.0 else m - 1
+    follow(chain.F, chain.G, chain.rest, chain.attitude > 0.0, rows, Z, out, coupled, nodes, np.empty(len(Z)))
+
+
+@kernel
+def follow(
+    F: Array, G: Array, rest: NDArray[np.int64], held: bool, rows: Array, Z: Array, out: Array, coupled: Array,
+    nodes: Array, row: Array,
+) -> None:  # fmt: skip
+    """Follow the covariance as in `followed`, of a chain whose attitude is ``held`` or not; ``row`` (n,) is used up."""
+    m, n = F.shape[1], len(Z)
+    for k in range(len(rest) - 1, -1, -1):
+        last = k == len(rest) - 1
+        ends = last or rest[k + 1] != rest[k]
+        first = m + 2 if ends and held else m - 1
         for i in range(first, -1, -1):
             completed(rows[k, i], i, Z)
         if not last:
-            explained(chain.F[k], chain.G[k], Z, row, out[k], coupled[k])
+            explained(F[k], G[k], Z, row, out[k], coupled[k])
         for i in range(m + 3):
             for j in range(2 * m + 3, n):
                 nodes[k, i, j - 2 * m - 3] = Z[i, j]

@@ -16,7 +16,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import inlined, kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.strapdown.coefficients import SIZE
@@ -70,9 +70,13 @@ def cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
-def lever(w: Vector | Array, wd: Vector | Array, ts: float) -> Nine:
-    """Mean W over a sample, by rows, of the mean rate and its derivative."""
+def applied(M: Array, x: Array) -> Array:
+    """M (3, 3) times vectors (n, 3)."""
+    return np.asarray(M[:, 0] * x[:, :1] + M[:, 1] * x[:, 1:2] + M[:, 2] * x[:, 2:])
+
+
+def mean_lever(w: Vector | Array, wd: Vector | Array, ts: float) -> Nine:
+    """Mean W over a sample, by rows, of the mean rate and its derivative; or of many samples, by components."""
     s = ts * ts / 12.0  # the rate changes within a sample
     xx, yy, zz = (
         w[0] * w[0] + s * wd[0] * wd[0],
@@ -91,45 +95,7 @@ def lever(w: Vector | Array, wd: Vector | Array, ts: float) -> Nine:
     )  # fmt: skip
 
 
-@kernel
-def true_force(y: Array, c: Gains, fs: Array) -> None:
-    """Specific force ``fs`` (n, 3) at the accelerometers, of their outputs, by fixed-point steps for K2."""
-    m = c.accelerometer
-    for k in range(len(y)):
-        for _ in range(4):
-            for i in range(3):
-                c_i = fs[k, i]
-                fs[k, i] = y[k, i] - c.k0[i] - c.k2[i] * c_i * c_i
-            x, u, z = fs[k, 0], fs[k, 1], fs[k, 2]
-            for i in range(3):
-                fs[k, i] = m[i, 0] * x + m[i, 1] * u + m[i, 2] * z
-
-
-@kernel
-def true_rate(y: Array, f: Array, c: Gains, w: Array) -> None:
-    """Rate ``w`` (n, 3) of the outputs of the gyros, by fixed-point steps for the asymmetry."""
-    m = c.gyro
-    for k in range(len(y)):
-        for _ in range(3):
-            for i in range(3):
-                by_force = c.g[i, 0] * f[k, 0] + c.g[i, 1] * f[k, 1] + c.g[i, 2] * f[k, 2]
-                w[k, i] = y[k, i] - c.d[i] - by_force - c.a[i] * abs(w[k, i])
-            x, u, z = w[k, 0], w[k, 1], w[k, 2]
-            for i in range(3):
-                w[k, i] = m[i, 0] * x + m[i, 1] * u + m[i, 2] * z
-
-
-@kernel
-def force_at_origin(w: Array, fs: Array, c: Gains, ts: float, wd: Array, f: Array) -> None:
-    """Derivative ``wd`` of the rate, and the force ``f`` (n, 3) without what turning does at the lever arms."""
-    n = len(w)
-    for k in range(n):
-        a, b, d, e = max(k - 2, 0), max(k - 1, 0), min(k + 1, n - 1), min(k + 2, n - 1)
-        for i in range(3):
-            wd[k, i] = (8.0 * (w[d, i] - w[b, i]) - (w[e, i] - w[a, i])) / (12.0 * ts)
-        m = lever(w[k], wd[k], ts)
-        for i in range(3):
-            f[k, i] = fs[k, i] - (m[3 * i] * c.r[i, 0] + m[3 * i + 1] * c.r[i, 1] + m[3 * i + 2] * c.r[i, 2])
+lever = kernel(mean_lever)
 
 
 @kernel
@@ -165,7 +131,7 @@ def increments(w: Array, f: Array, pairs: Array, ts: float, turn: Array, gain: A
                 gain[k, i] += one[i] + two[i]
 
 
-@kernel
+@inlined
 def matrix(q: Quaternion, C: Array) -> None:
     """The rotation matrix ``C`` (3, 3) of a quaternion."""
     for j in range(3):
@@ -174,18 +140,7 @@ def matrix(q: Quaternion, C: Array) -> None:
             C[i, j] = v[i]
 
 
-@kernel
-def applied(M: Array, x: Vector) -> Vector:
-    """M (3, 3) times a vector."""
-    u, v, w = x
-    return (
-        M[0, 0] * u + M[0, 1] * v + M[0, 2] * w,
-        M[1, 0] * u + M[1, 1] * v + M[1, 2] * w,
-        M[2, 0] * u + M[2, 1] * v + M[2, 2] * w,
-    )
-
-
-@kernel
+@inlined
 def without(x: Array, bias: Vector, ts: float) -> Vector:
     """An increment without what a bias adds to it."""
     return x[0] - bias[0] * ts, x[1] - bias[1] * ts, x[2] - bias[2] * ts
@@ -212,7 +167,7 @@ def turned(turn: Array, sample: Whole, q: Array) -> None:
         q[node, 0], q[node, 1], q[node, 2], q[node, 3] = of
 
 
-@kernel
+@inlined
 def add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
     """Add a sample to the sums of a block."""
     w, fs = motion.w[k], motion.fs[k]
@@ -229,13 +184,12 @@ def add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
         sums[15 + i] += m[i] * ts
 
 
-@kernel
+@inlined
 def sources(
     C: Array, sums: Array, dt: float, of_gyros: Array, of_accs: Array, north: float, up: float, out: Array
 ) -> None:
     """Errors (6, 51) of attitude and velocity gained in a block of ``dt`` [s] per error of each coefficient, with the
-    inverse gains (3, 3) of both triads; ``north`` and ``up`` are the earth rate in n."""
-    out[:] = 0.0
+    inverse gains (3, 3) of both triads, where they are not 0; ``north`` and ``up`` are the earth rate in n."""
     for a in range(3):
         for i in range(3):
             of_gyro = of_acc = 0.0
@@ -251,18 +205,15 @@ def sources(
                 out[a, 40 + 3 * i + j] = of_gyro * sums[6 + j]
                 out[3 + a, 15 + 3 * i + j] = of_acc * sums[9 + j]
                 out[3 + a, 27 + 3 * i + j] = -C[a, i] * sums[15 + 3 * i + j]
-            out[3 + a, 36] -= C[a, i] * sums[24 + i]
+        out[3 + a, 36] = -C[a, 0] * sums[24] - C[a, 1] * sums[25] - C[a, 2] * sums[26]
     out[5, 49] = -dt
     out[1, 50], out[2, 50] = up * dt, -north * dt
 
 
-@kernel
+@inlined
 def transition(force: Vector, earth: Array, dt: float, F: Array) -> None:
-    """Transition ``F`` (m, m) of errors through a block with a gain of velocity ``force`` (3,) in n; of biases that
-    walk only the diagonal."""
-    F[:] = 0.0
-    for i in range(len(F)):
-        F[i, i] = 1.0
+    """Transition ``F`` (m, m) of errors through a block with a gain of velocity ``force`` (3,) in n, where it is not 1;
+    nothing of biases that walk."""
     for k in range(2):
         s = (k + 1.0) * dt
         F[3 * k, 3 * k + 1], F[3 * k, 3 * k + 2] = s * earth[2], -s * earth[1]
@@ -287,7 +238,7 @@ def product(F: Array, X: Array, out: Array) -> None:
             X[i, j] = out[i, j]
 
 
-@kernel
+@inlined
 def gathered(F: Array, S: Array, G: Array, out: Array) -> None:
     """``G`` (6, 51) becomes F G + S, S acting through the block: its errors of attitude by half on velocity."""
     for j in range(G.shape[1]):
@@ -303,7 +254,7 @@ def gathered(F: Array, S: Array, G: Array, out: Array) -> None:
             G[i, j] = out[i, j]
 
 
-@kernel
+@inlined
 def noise_added(F: Array, variances: Array, dt: float, Q: Array) -> None:
     """Add to ``Q`` (m, m) what white noise and walks of ``variances`` (4,) [per s] gain in a block."""
     for i in range(3):
@@ -353,7 +304,18 @@ class Shot(NamedTuple):
     Q: Array
 
 
-@kernel
+class Room(NamedTuple):
+    """Room to work in: the attitude ``C`` of a block, its transition ``F`` (m, m), 1 at first, its sources ``S`` (6,
+    51), 0 at first, its ``sums`` (27,), and what products need, ``square`` (6, m) and ``wide`` (6, 51)."""
+
+    C: Array
+    F: Array
+    S: Array
+    sums: Array
+    square: Array
+    wide: Array
+
+
 def shoot(
     motion: Motion, cuts: Whole, first: Whole, state: State, c: Gains, world: World, noise: Array, shot: Shot
 ) -> None:
@@ -361,21 +323,35 @@ def shoot(
 
     ``cuts`` are the samples at which blocks begin, and ``first`` (k + 1,) the block that begins at each node.
     """
-    m = shot.F.shape[1]
-    C, F, square = np.empty((3, 3)), np.empty((m, m)), np.empty((6, m))
-    S, wide, sums = np.empty((6, SIZE)), np.empty((6, SIZE)), np.empty(SUMS)
+    m, bias = shot.F.shape[1], state.bias
+    shot.F[:], shot.G[:], shot.Q[:] = np.eye(m), 0.0, 0.0
+    off = np.hstack([applied(c.gyro, bias[:, :3]), applied(c.accelerometer, bias[:, 3:])])
+    room = Room(
+        np.empty((3, 3)),
+        np.eye(m),
+        np.zeros((6, SIZE)),
+        np.empty(SUMS),
+        np.empty((6, m)),
+        np.empty((6, SIZE)),
+    )
+    shots(motion, cuts, first, state._replace(bias=off), c.gyro, c.accelerometer, world, noise, shot, room)
+
+
+@kernel
+def shots(
+    motion: Motion, cuts: Whole, first: Whole, state: State, of_gyros: Array, of_accs: Array, world: World,
+    noise: Array, shot: Shot, room: Room,
+) -> None:  # fmt: skip
+    """Carry the solution on, with inverse gains (3, 3) of both triads; biases are as they act on rate and force."""
+    C, F, S, sums = room.C, room.F, room.S, room.sums
     for node in range(len(first) - 1):
         q = (state.q[node, 0], state.q[node, 1], state.q[node, 2], state.q[node, 3])
         v = (state.v[node, 0], state.v[node, 1], state.v[node, 2])
-        b = state.bias
-        drift = applied(c.gyro, (b[node, 0], b[node, 1], b[node, 2]))
-        bias = applied(c.accelerometer, (b[node, 3], b[node, 4], b[node, 5]))
-        Phi, G, Q = shot.F[node], shot.G[node], shot.Q[node]
-        Phi[:], G[:], Q[:] = 0.0, 0.0, 0.0
-        for i in range(m):
-            Phi[i, i] = 1.0
+        drift = (state.bias[node, 0], state.bias[node, 1], state.bias[node, 2])
+        bias = (state.bias[node, 3], state.bias[node, 4], state.bias[node, 5])
         for block in range(first[node], first[node + 1]):
-            sums[:] = 0.0
+            for i in range(SUMS):
+                sums[i] = 0.0
             before, dt = q, (cuts[block + 1] - cuts[block]) * world.ts
             for k in range(cuts[block], cuts[block + 1]):
                 add_sample(motion, k, world.ts, sums)
@@ -383,18 +359,18 @@ def shoot(
                 q, v = carried(q, v, turn, gain, world)
             middle = normalize((before[0] + q[0], before[1] + q[1], before[2] + q[2], before[3] + q[3]))
             matrix(middle, C)
-            sources(C, sums, dt, c.gyro, c.accelerometer, world.earth[1], world.earth[2], S)
+            sources(C, sums, dt, of_gyros, of_accs, world.earth[1], world.earth[2], S)
             transition(rotate(middle, (sums[6], sums[7], sums[8])), world.earth, dt, F)
-            if m == 12:
+            if len(F) == 12:
                 for i in range(3):
                     for j in range(3):
                         F[i, 6 + j], F[3 + i, 9 + j] = S[i, j], S[3 + i, 12 + j]
                         F[3 + i, 6 + j] = 0.5 * (
                             F[3 + i, 0] * S[0, j] + F[3 + i, 1] * S[1, j] + F[3 + i, 2] * S[2, j]
                         )
-            product(F, Phi, square)
-            gathered(F, S, G, wide)
-            spread(F, Q, square)
-            noise_added(F, noise, dt, Q)
+            product(F, shot.F[node], room.square)
+            gathered(F, S, shot.G[node], room.wide)
+            spread(F, shot.Q[node], room.square)
+            noise_added(F, noise, dt, shot.Q[node])
         shot.q[node, 0], shot.q[node, 1], shot.q[node, 2], shot.q[node, 3] = q
         shot.v[node, 0], shot.v[node, 1], shot.v[node, 2] = v

@@ -13,7 +13,7 @@ import numpy as np
 from inercal.arrays import Array, short_repr
 from inercal.strapdown.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
 from inercal.strapdown.delay import delayed
-from inercal.strapdown.kernels import Gains, Motion, force_at_origin, increments, true_force, true_rate
+from inercal.strapdown.kernels import Gains, Motion, applied, increments, mean_lever
 
 
 @short_repr
@@ -68,14 +68,50 @@ def gains(c: Array) -> Gains:
 
 def freed(samples: Samples, c: Array) -> Motion:
     """Motion of b at the times of which the accelerometers tell: stamps less the delay."""
-    n, ts, by = len(samples.rate), samples.ts, gains(c)
+    ts, by = samples.ts, gains(c)
     rate = samples.rate if c[TAU] == 0.0 else delayed(samples.rate, c[TAU] / ts)
-    w, wd, fs, f, turn, gain = (np.zeros((n, 3)) for _ in range(6))
-    true_force(samples.force, by, fs)
-    true_rate(rate, fs, by, w)
-    force_at_origin(w, fs, by, ts, wd, f)
-    if c[G].any():
-        true_rate(rate, f, by, w)
-        force_at_origin(w, fs, by, ts, wd, f)
+    fs = _true_force(samples.force, by)
+    w = _true_rate(rate, fs, by, np.zeros_like(fs))
+    wd = _derivative(w, ts)
+    f = _at_origin(w, wd, fs, by, ts)
+    if by.g.any():
+        w = _true_rate(rate, f, by, w)
+        wd = _derivative(w, ts)
+        f = _at_origin(w, wd, fs, by, ts)
+    turn, gain = np.empty_like(w), np.empty_like(w)
     increments(w, f, PAIRS, ts, turn, gain)
     return Motion(w, wd, fs, f, turn, gain)
+
+
+def _true_force(y: Array, c: Gains) -> Array:
+    """Specific force (n, 3) at the accelerometers, of their outputs, by fixed-point steps for K2."""
+    left = y - c.k0
+    fs = applied(c.accelerometer, left)
+    for _ in range(3 if c.k2.any() else 0):
+        fs = applied(c.accelerometer, left - c.k2 * fs * fs)
+    return fs
+
+
+def _true_rate(y: Array, f: Array, c: Gains, w: Array) -> Array:
+    """Rate (n, 3) of the outputs of the gyros, by fixed-point steps for the asymmetry, from ``w`` on."""
+    left = y - c.d
+    if c.g.any():
+        left -= applied(c.g, f)
+    for _ in range(3 if c.a.any() else 1):
+        w = applied(c.gyro, left - c.a * np.abs(w))
+    return w
+
+
+def _derivative(w: Array, ts: float) -> Array:
+    """Derivative of the rate over each sample, of four neighbours; at the ends the last stands for those beyond."""
+    padded = np.pad(w, ((2, 2), (0, 0)), mode="edge")
+    return np.asarray((8.0 * (padded[3:-1] - padded[1:-3]) - (padded[4:] - padded[:-4])) / (12.0 * ts))
+
+
+def _at_origin(w: Array, wd: Array, fs: Array, c: Gains, ts: float) -> Array:
+    """Force (n, 3) without what turning does at the lever arms."""
+    m = mean_lever(w.T, wd.T, ts)
+    f = np.empty_like(fs)
+    for i in range(3):
+        f[:, i] = fs[:, i] - (m[3 * i] * c.r[i, 0] + m[3 * i + 1] * c.r[i, 1] + m[3 * i + 2] * c.r[i, 2])
+    return f
