@@ -68,7 +68,21 @@ VALUES = st.recursive(
 BODIES = st.one_of(
     st.dictionaries(
         st.sampled_from(
-            ["title", "example", "kind", "rate", "number", "instrument", "tool", "settings", "x"]
+            [
+                "title",
+                "example",
+                "kind",
+                "rate",
+                "number",
+                "instrument",
+                "tool",
+                "settings",
+                "x",
+                "source",
+                "record",
+                "to",
+                "every",
+            ]
         ),
         VALUES,
         max_size=4,
@@ -93,6 +107,11 @@ ROUTES = st.sampled_from(
         ("POST", "/jobs/{}/certificate"),
         ("POST", "/jobs/{}/convert"),
         ("POST", "/sessions/{}/design"),
+        ("POST", "/sessions/{}/live"),
+        ("GET", "/sessions/{}/live"),
+        ("GET", "/sessions/{}/live/rows"),
+        ("GET", "/sessions/{}/live/files/{}"),
+        ("POST", "/sessions/{}/live/stop"),
         ("PUT", "/lab"),
     ]
 )

@@ -234,6 +234,7 @@ def test_an_angle_is_measured_on_the_page(tmp_path):
         assert "gyro" in page.inner_text("[data-channels]")
         page.wait_for_function("document.querySelector('[data-alarms]').innerText.includes('bad_row')")
         page.wait_for_function("(document.querySelector('.js-plotly-plot').data || []).length === 3")
+        assert "Sources:" not in page.inner_text("main")
         assert page.inner_text("[data-rest]") == "Rest: not known, for nothing was quiet for 5 s yet."
         again, other = opened(chromium, bench)  # a second look, at what goes on without the first
         again.goto(f"{bench.base}/live")

@@ -18,7 +18,7 @@ def status(live: Live) -> dict[str, Any]:
         "state": of.state,
         "words": _words(live),
         "rest_words": _rest_words(live.rest),
-        "open": of.alive,
+        "gone": live.gone,
         "failure": of.failure,
         "verdict": of.verdict,
         "rest": live.rest.at,
@@ -58,7 +58,7 @@ def _words(live: Live) -> str:
     of = live.measurement
     if of.state == "ended" and of.failure:
         return "The measurement has ended with an error."
-    if of.state in ("waiting", "running") and not of.alive:
+    if live.gone:
         return "The source is gone, and is tried again."
     return _STATES[of.state]
 

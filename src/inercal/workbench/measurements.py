@@ -52,12 +52,20 @@ class Wish:
 
 @dataclass(frozen=True, eq=False)
 class Live:
-    """A measurement of a session, the rest detector beside it, and the command that does the same."""
+    """A measurement of a session as it was wished for, the rest detector beside it, and the command that does the
+    same."""
 
+    wish: Wish
     measurement: Measurement
     rest: Rest
     command: str
     recording: Path | None
+
+    @property
+    def gone(self) -> bool:
+        """True while a source that died is tried again; a recording that was read to its end is not gone."""
+        of, replayed = self.measurement, self.wish.source.lower().startswith("replay:")
+        return of.state in ("waiting", "running") and not (of.alive or replayed)
 
     @property
     def ended(self) -> bool:
@@ -154,7 +162,7 @@ def _prepared(session: Session, wish: Wish) -> Live:
 
     record_map = None if session.map is None else read_map(session.map)
     measurement = Measurement(Plan(source, make, record_map, recording, sinks))
-    return Live(measurement, rest, _command(session, wish, sinks, recording), recording)
+    return Live(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
 
 
 def _own_source(source: Source, folder: Path) -> Source:

@@ -41,7 +41,7 @@ def add(bench: Bench) -> None:
     @ui.page("/sessions/{number}/live")
     def of_session(number: str) -> None:
         session = bench.sessions.get(number)
-        with framed("Live", session, "live"):
+        with framed("Live measurement", session, "live"):
             if session.study is None:
                 ui.label("There is no study yet, which would say what is measured.")
                 ui.link("Begin one", f"/sessions/{session.id}/study")
@@ -94,16 +94,27 @@ class _Desk:
 
     def _source(self) -> None:
         """The fields of a measurement."""
-        with ui.element("div").classes("w-full grid grid-cols-1 gap-x-6 md:grid-cols-2") as self.fields:
-            self.source = ui.input("Source", placeholder="udp://127.0.0.1:5005").classes("w-full")
-            self.record = ui.input("Record the raw rows in", value=next_name(self.session)).classes("w-full")
-            self.to = ui.textarea("Send the rows to, one a line").props("rows=1 autogrow").classes("w-full")
-            self.every = ui.input("Interval of the rows", placeholder="each sample").classes("w-full")
-        ui.label(
-            f"Sources: {', '.join(SOURCES)}; a file is one of this session. "
-            f"Rows go to {', '.join(each for each in SINKS if each != 'text:-')}; files land beside the recording. "
-            "Without a name nothing is recorded."
-        ).classes("quiet text-sm")
+        live = self.bench.measurements.of(self.session)
+        last = Wish("") if live is None else live.wish
+        with ui.element("div").classes("w-full") as self.fields:
+            with ui.element("div").classes("w-full grid grid-cols-1 gap-x-6 md:grid-cols-2"):
+                self.source = ui.input("Source", value=last.source).classes("w-full")
+                self.record = ui.input("Record the raw rows in", value=next_name(self.session)).classes(
+                    "w-full"
+                )
+                self.to = ui.textarea("Send the rows to, one a line", value="\n".join(last.to)).classes(
+                    "w-full"
+                )
+                self.to.props("rows=1 autogrow")
+                every = f"{last.every:g} s" if last.every else ""
+                self.every = ui.input("Interval of the rows, each sample if empty", value=every).classes(
+                    "w-full"
+                )
+            ui.label(
+                f"Sources: {', '.join(SOURCES)}; a file is one of this session. "
+                f"Rows go to {', '.join(each for each in SINKS if each != 'text:-')}; files land beside the recording. "
+                "Without a name nothing is recorded."
+            ).classes("quiet text-sm")
 
     def begin(self) -> None:
         """Begin to measure as the fields say."""
