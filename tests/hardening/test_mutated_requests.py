@@ -79,6 +79,10 @@ BODIES = st.one_of(
                 "settings",
                 "earlier",
                 "x",
+                "source",
+                "record",
+                "to",
+                "every",
             ]
         ),
         VALUES,
@@ -109,6 +113,11 @@ ROUTES = st.sampled_from(
         ("POST", "/validation"),
         ("GET", "/instruments/{}"),
         ("GET", "/certificates/{}"),
+        ("POST", "/sessions/{}/live"),
+        ("GET", "/sessions/{}/live"),
+        ("GET", "/sessions/{}/live/rows"),
+        ("GET", "/sessions/{}/live/files/{}"),
+        ("POST", "/sessions/{}/live/stop"),
         ("PUT", "/lab"),
     ]
 )

@@ -208,7 +208,8 @@ def _brought(client: Any, work: Any, address: str) -> str:
             if hasattr(self.work, "prepare"):
                 self.work.prepare()
 
-    for left in reversed(range(_AGAIN)):
+    times = 0
+    while True:
         try:
             client.register_plugin(Work())
             return name
@@ -217,10 +218,10 @@ def _brought(client: Any, work: Any, address: str) -> str:
                 client.unregister_worker_plugin(name)
             if isinstance(error, InercalError):
                 raise
-            if left and client.status == "running" and isinstance(error, _distributed().comm.CommClosedError):
-                continue  # a worker was lost meanwhile
-            raise _unable(error, client, address) from error
-    raise AssertionError
+            times += 1
+            lost = isinstance(error, _distributed().comm.CommClosedError)  # a worker, meanwhile
+            if not lost or times > _AGAIN or client.status != "running":
+                raise _unable(error, client, address) from error
 
 
 def _unable(error: Exception, client: Any, address: str) -> InercalError:

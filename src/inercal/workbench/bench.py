@@ -16,6 +16,7 @@ import numpy as np
 from inercal._files import read_bytes, write_text
 from inercal.errors import InercalError, InputError
 from inercal.workbench.jobs import Job, Queue
+from inercal.workbench.measurements import MEASURED, Measurements
 from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions, put
 
 if TYPE_CHECKING:
@@ -46,12 +47,14 @@ class Looked:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A work folder: its sessions, its queue of jobs, and the store for what is kept, the user's own if None."""
+    """A work folder: its sessions, its queue of jobs, the store for what is kept, the user's own if None, and the
+    measurements by wire that are at work."""
 
     root: Path
     sessions: Sessions
     queue: Queue
     store: str | None = None
+    measurements: Measurements = field(default_factory=Measurements)
     _looked: OrderedDict[tuple[Any, ...], tuple[Looked, ...]] = field(default_factory=OrderedDict, repr=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
@@ -272,8 +275,15 @@ class Bench:
         """The newest search for a plan of a session, None without any."""
         return next((job for job in self.queue if job.session == session.id and job.designs), None)
 
+    def by_wire(self, kind: str) -> Session:
+        """A new session with a study of that kind to measure by wire, without a recording; raises `InputError`."""
+        if kind not in MEASURED:
+            raise InputError("kind", f"found {kind!r}, expected one of {', '.join(MEASURED)}")
+        return self.begin_study(self.sessions.begin(f"by wire: {KINDS[kind]}"), kind)
+
     def close(self) -> None:
-        """End the running job."""
+        """End the running job, and all measurements."""
+        self.measurements.close()
         self.queue.close()
 
 

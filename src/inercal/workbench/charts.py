@@ -160,15 +160,16 @@ def figure(
                 "hovertemplate": f"%{{y:.6g}} {course.unit}",
             }
         )
-    return {"data": data, "layout": _layout(shown, sensors, span, notes or Notes()), "config": _CONFIG}
+    return {"data": data, "layout": _layout(shown, sensors, span, notes or Notes()), "config": CONFIG}
 
 
-_CONFIG = {
+CONFIG = {
     "displaylogo": False,
     "responsive": True,
     "scrollZoom": True,
     "modeBarButtonsToRemove": ["lasso2d", "select2d"],
 }
+"""How figures behave under the mouse."""
 
 
 def _bands(rests: Sequence[tuple[float, float]], span: tuple[float, float] | None) -> list[dict[str, Any]]:

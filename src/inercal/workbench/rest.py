@@ -18,6 +18,7 @@ from inercal.errors import InercalError, InputError
 from inercal.workbench.bench import Bench
 from inercal.workbench.guard import REPORT_POLICY
 from inercal.workbench.jobs import Job
+from inercal.workbench.rest_live import add_live
 from inercal.workbench.sessions import Session, receive, safe_name
 
 
@@ -198,6 +199,7 @@ def rest_of(bench: Bench) -> FastAPI:
         bench.state(text)
         return Response(status_code=204)
 
+    add_live(app, bench, _file)
     return app
 
 

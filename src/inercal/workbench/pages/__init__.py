@@ -9,7 +9,17 @@ def add_pages(bench: Bench) -> None:
     """Make the pages known to NiceGUI."""
     from nicegui import app
 
-    from inercal.workbench.pages import design, home, instruments, recording, result, run, study, validation
+    from inercal.workbench.pages import (
+        design,
+        home,
+        instruments,
+        live,
+        recording,
+        result,
+        run,
+        study,
+        validation,
+    )
     from inercal.workbench.pages.frame import framed, refused
 
     def failed(error: Exception) -> None:
@@ -17,5 +27,5 @@ def add_pages(bench: Bench) -> None:
             refused(error)
 
     app.on_page_exception(failed)
-    for page in (home, recording, study, design, run, result, instruments, validation):
+    for page in (home, recording, study, design, run, result, live, instruments, validation):
         page.add(bench)

@@ -18,11 +18,12 @@ _STEPS = (
     ("design", "Design"),
     ("run", "Run"),
     ("result", "Result"),
+    ("live", "Live"),
 )
 PATIENCE = 120.0
 """Time [s] that a page may take where it reads files, on a busy machine."""
 
-_PLACES = (("/", "Home"), ("/instruments", "Instruments"), ("/validation", "Validation"))
+_PLACES = (("/", "Home"), ("/live", "Live"), ("/instruments", "Instruments"), ("/validation", "Validation"))
 
 
 @contextmanager
