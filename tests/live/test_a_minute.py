@@ -95,6 +95,8 @@ def test_every_row_is_used_or_counted(seconds, study, tmp_path, broker, monkeypa
             assert counts.lost == 0
     print(f"the sender was {behind:.3f} s behind at most; memory {early:.1f} MiB, then {late:.1f} MiB")
     assert more < 20_000  # an object for each row of one wire would be 40 000
-    assert late - early < 24.0  # 150 bytes for each row of all wires; what waits on a busy machine is a part of it
+    assert (
+        late - early < 24.0
+    )  # 150 bytes for each row of all wires; what waits on a busy machine is a part of it
     cable.close()
     listening.close()
