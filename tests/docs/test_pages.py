@@ -28,6 +28,7 @@ SLOW = [
     "docs/how-to/calibrate-on-a-turntable.md",
     "docs/how-to/design-a-path.md",
     "docs/how-to/live.md",
+    "docs/how-to/measure-by-wire.md",
     "docs/how-to/noise.md",
     "docs/how-to/on-a-table-with-known-angles.md",
     "docs/how-to/poses-or-turns.md",

@@ -382,6 +382,7 @@ STREAMS = {
     "selfcal": "selfcal platform.csv --study selfcal.toml --stream",
     "aoa": "aoa model.csv --study aoa.toml --stream",
     "strapdown": "calibrate strapdown unit.csv --study strapdown.toml --stream",
+    "live": "live replay:log.csv?speed=0 --study imu.toml",
 }
 
 

@@ -152,7 +152,7 @@ def _followed(measurement: Measurement, output: Output) -> int:
             asked = True
             measurement.stop()
     if isinstance(measurement.error, InercalError):
-        if measurement.counts.rows:
+        if measurement.counts.used:
             output.say(str(measurement.counts))
         raise measurement.error
     if measurement.error is not None:

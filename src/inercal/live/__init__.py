@@ -14,7 +14,7 @@ In Python, for a page or a program of one's own::
     running.columns             # ("t [s]", "theta [deg]", "u_theta [deg]", ...), once rows come
     running.latest["theta"]     # Quantity(value=3.21, u=0.01, unit="deg"): the last row
     running.channels["a1"]      # the last sample, as it came
-    at, rows = running.rows()   # of the last two minutes, 50 a second at most; later running.rows(at)
+    at, rows = running.rows()   # of the last minute, 50 a second at most; later running.rows(at)
     running.alarms              # what was said: Alarm(at=12.1, code="saturation", message="...")
     running.counts              # Counts: rows, lost, disordered, late, ...; str(counts) is one line for people
     running.stop(wait=10.0)     # in order: what has come is worked on, sinks and recording are closed

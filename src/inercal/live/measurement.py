@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from inercal.live.estimators import Make, Say, SayFinding
     from inercal.records.maps import RecordMap
 
-KEPT, THIN = 6000, 0.02
+KEPT, THIN = 3000, 0.02
 """Rows that are kept for a look back, and the least time [s] between them."""
 
 ALARMS = 200
@@ -91,7 +91,7 @@ class Measurement:
         self._intake = Intake(plan.source, self._said)
         self._feed: Feed | None = None
         self._outlets: list[Outlet] = []
-        self._stop = threading.Event()
+        self._stop, self._done = threading.Event(), threading.Event()
         self._watch = Watch(self._stop, plan.source)
         self._alarms: deque[Alarm] = deque(maxlen=ALARMS)
         self._view: deque[tuple[float | str, ...]] = deque(maxlen=KEPT)
@@ -121,9 +121,9 @@ class Measurement:
             self.join(wait)
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait; True once it has ended."""
-        self._thread.join(timeout)
-        return not self._thread.is_alive()
+        """Wait; True once it has ended. An interrupt ends the waiting alone, which `threading.Thread.join` mistakes
+        for the end of the thread."""
+        return self._done.wait(timeout)
 
     @property
     def alive(self) -> bool:
@@ -146,7 +146,7 @@ class Measurement:
         return self._watch.channels
 
     def rows(self, after: int = 0) -> tuple[int, list[tuple[float | str, ...]]]:
-        """Rows of the last two minutes, thinned to 50 a second, of those that came after the first ``after`` ones; and
+        """Rows of the last minute, thinned to 50 a second, of those that came after the first ``after`` ones; and
         the number to ask with next time."""
         with self._lock:
             new = min(self._given - after, len(self._view))
@@ -204,6 +204,7 @@ class Measurement:
             self.error, self.failure = error, f"unexpected {type(error).__name__} ({error})"
         finally:
             self.state = "ended"
+            self._done.set()
 
     def _run(self) -> None:
         """Run to the end of the source."""

@@ -6,6 +6,7 @@ import io
 import re
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from inercal.records.titles import name_and_unit
 SPAN, MOST = 10.0, 100_000
 """A piece holds the rows of that time [s], at most so many."""
 
+GOODBYE = 60.0
+
 
 class PieceFiles:
     """Writes rows to ``00000001.parquet`` and so on in a folder, or ``.h5``; numbers go on from those that are there.
@@ -30,11 +33,10 @@ class PieceFiles:
         self._folder = sink.folder
         self._columns: Sequence[str] = ()
         self._suffix, self._form = (".parquet", _parquet) if sink.form == "parquet" else (".h5", _hdf5)
-        if sink.form == "parquet":
-            try:
-                import pyarrow  # noqa: F401
-            except ImportError as error:
-                raise MissingExtraError("Parquet", "files") from error
+        try:  # now, for that takes its time
+            import_module("pyarrow.parquet" if sink.form == "parquet" else "h5py")
+        except ImportError as error:
+            raise MissingExtraError("Parquet", "files") from error
         try:
             self._folder.mkdir(exist_ok=True)
             there = [path.stem for path in self._folder.iterdir() if path.suffix == self._suffix]
@@ -43,6 +45,11 @@ class PieceFiles:
         self._number = max((int(stem) for stem in there if re.fullmatch(r"\d{8}", stem)), default=0)
         self._rows: list[Sequence[float | str]] = []
         self._begun = 0.0
+
+    @property
+    def goodbye(self) -> float:
+        """Time [s] for the last piece: a disk may be slow, but it is not stuck."""
+        return GOODBYE
 
     @property
     def held(self) -> int:

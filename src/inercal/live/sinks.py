@@ -24,7 +24,7 @@ ROOM = 10_000
 
 WAIT = 0.2
 GOODBYE = 5.0
-"""Time [s] that a sink is given at the end for what still waits."""
+"""Time [s] that a sink is given at the end whose reader may be stuck."""
 
 
 class Writer(Protocol):
@@ -33,6 +33,10 @@ class Writer(Protocol):
     @property
     def held(self) -> int:
         """Rows that were taken and are not out yet."""
+
+    @property
+    def goodbye(self) -> float:
+        """Time [s] that it is given at the end, and before a checkpoint, for the rows that it has."""
 
     def begin(self, columns: Sequence[str]) -> None:
         """Take the titles of the rows, before the first of them."""
@@ -108,20 +112,27 @@ class Outlet:
         with self._change:
             self._asked_to_settle = True
             self._change.notify_all()
-            self._change.wait_for(lambda: self._settled or bool(self.failure), GOODBYE)
+            self._change.wait_for(lambda: self._settled or bool(self.failure), self._writer.goodbye)
 
     def close(self) -> None:
         """Write what waits, as far as it goes in time, and end; the rest is dropped, and counted."""
         with self._change:
             self._closing = True
             self._change.notify_all()
-        if self._thread.is_alive():
-            self._thread.join(GOODBYE)
-        elif not self._begun:
+        if not self._begun:
             self._writer.close()
+            return
+        self._thread.join(self._writer.goodbye)
+        late = self._thread.is_alive()
         with self._change:
-            self._dropped += len(self._rows)
+            held = self._writer.held if late else 0
+            self._written -= held
+            self._dropped += len(self._rows) + held
             self._rows.clear()
+        if late:
+            self._say(
+                f"{self.name}: has not taken its last rows in {self._writer.goodbye:g} s, they are dropped"
+            )
 
     @property
     def counts(self) -> SinkCounts:
@@ -195,10 +206,22 @@ def _writer(sink: Sink, print_line: Callable[[str], None], say: Callable[[str], 
             return _Messages(sink, say)
 
 
-class _Printed:
-    """Lines on standard output."""
+class _AtOnce:
+    """A writer that holds no row back, and whose reader may be stuck."""
 
     held = 0
+
+    @property
+    def goodbye(self) -> float:
+        """Time [s] for the last rows."""
+        return GOODBYE
+
+    def settle(self) -> None:
+        """Nothing is held back."""
+
+
+class _Printed(_AtOnce):
+    """Lines on standard output."""
 
     def __init__(self, print_line: Callable[[str], None]) -> None:
         self._print = print_line
@@ -213,17 +236,12 @@ class _Printed:
             self._print("\n".join(row.text for row in rows))
         return len(rows)
 
-    def settle(self) -> None:
-        """Nothing is held back."""
-
     def close(self) -> None:
         """Standard output stays open."""
 
 
-class _TextFile:
+class _TextFile(_AtOnce):
     """Lines in a file, which is a new one."""
-
-    held = 0
 
     def __init__(self, sink: Text) -> None:
         self._file = new_file(str(sink.file))
@@ -262,10 +280,8 @@ def new_file(path: str) -> int:
         raise InputError(path, f"cannot be written ({error.strerror or error})") from error
 
 
-class _Datagrams:
+class _Datagrams(_AtOnce):
     """A line a datagram, the titles first and again each second, so that who comes later knows them."""
-
-    held = 0
 
     def __init__(self, sink: Udp) -> None:
         self._address: Any
@@ -294,18 +310,13 @@ class _Datagrams:
             return False
         return True
 
-    def settle(self) -> None:
-        """Nothing is held back."""
-
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
 
 
-class _Messages:
+class _Messages(_AtOnce):
     """A message a row at a broker, which is tried again with growing pauses where it has gone."""
-
-    held = 0
 
     def __init__(self, sink: Mqtt, say: Callable[[str], None]) -> None:
         self._at, self._say = sink, say
@@ -341,9 +352,6 @@ class _Messages:
             return False
         self._say(f"{self._at}: there again")
         return True
-
-    def settle(self) -> None:
-        """Nothing is held back."""
 
     def close(self) -> None:
         """Leave the broker."""
