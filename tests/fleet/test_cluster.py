@@ -112,7 +112,10 @@ def quiet(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_campaign_has_the_digits_of_one_process(quiet, expected):
-    found = run(noise, runs=RUNS, seed=SEED, executor=Cluster(quiet), chunk=1)["x"]
+    with open(quiet) as file:
+        address = json.load(file)["address"]
+    assert address.startswith("tcp://")
+    found = run(noise, runs=RUNS, seed=SEED, executor=Cluster(address), chunk=1)["x"]
     assert np.array_equal(found, expected)
 
 
