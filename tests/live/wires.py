@@ -2,6 +2,7 @@
 
 import contextlib
 import datetime
+import io
 import ipaddress
 import os
 import pty
@@ -16,6 +17,11 @@ import tty
 
 import numpy as np
 import pytest
+
+from inercal.live.measurement import measure
+from inercal.stream.lines import Lines
+from inercal.stream.monitor import Monitor
+from inercal.stream.run import run
 
 HEADER = b"t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n"
 
@@ -118,6 +124,8 @@ class Server:
         self.client.sendall(data)
 
     def close(self):
+        with contextlib.suppress(OSError):
+            self.listening.shutdown(socket.SHUT_RDWR)  # wakes who accepts
         self.listening.close()
         if self.client is not None:
             with contextlib.suppress(OSError):
@@ -220,3 +228,51 @@ class Mosquitto:
             made.subscribe(topic, qos=1)
             assert subscribed.wait(10.0)
         return made
+
+
+class Topic:
+    """A sender of messages."""
+
+    def __init__(self, broker, topic):
+        self.client, self.topic = broker.client(), topic
+        assert until(self.client.is_connected)
+
+    def send(self, data):
+        self.client.publish(self.topic, data, qos=1).wait_for_publish(10.0)
+
+    def close(self):
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+def wire(kind, folder, broker=None):
+    """The near end of a wire, and the address of the far one."""
+    match kind:
+        case "serial":
+            made = Cable(folder)
+            return made, f"serial:{made.name}?baud=921600"
+        case "udp":
+            port = free_port(socket.SOCK_DGRAM)
+            return Datagrams(port), f"udp://127.0.0.1:{port}"
+        case "tcp":
+            made = Server()
+            return made, f"tcp://127.0.0.1:{made.port}"
+        case "mqtts":
+            ca = broker.folder / "cert.pem"
+            return Topic(broker, "rig/a"), f"mqtts://127.0.0.1:{broker.tls_port}/rig/a?ca={ca}"
+
+
+def by_stream(lines, record_map=None):
+    """The output of ``monitor`` on lines from a file."""
+    out = []
+    stream = Lines(io.BytesIO(b"".join(lines)), "lines", record_map, lambda finding: None)
+    run(Monitor(stream), stream, out.append)
+    return [f"{line}\n" for line in out]
+
+
+def waiting(address, study, **given):
+    """A measurement that is ready for rows."""
+    running = measure(address, study, **given)
+    assert until(lambda: running.state in ("waiting", "ended"), 120.0)
+    assert not running.failure
+    return running

@@ -227,7 +227,9 @@ def _number(keys: dict[str, str], key: str, text: str, least: float, largest: fl
 
 def _host_and_port(rest: str, text: str, port: int | None) -> tuple[str, int]:
     """Host and port of ``//host:port``; ``port`` where none is given."""
-    match = re.fullmatch(r"//(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9._-]+))(?::(\d{1,5}))?/?", rest)
+    match = re.fullmatch(
+        r"//(?:\[([0-9A-Fa-f:.]+)\]|([A-Za-z0-9_-]{1,63}(?:\.[A-Za-z0-9_-]{1,63})*))(?::(\d{1,5}))?/?", rest
+    )
     number = port if match is None or match[3] is None else int(match[3])
     if match is None or number is None or not 1 <= number <= 65535:
         raise InputError(shown(text), "found no host and port, expected them as in udp://127.0.0.1:5005")

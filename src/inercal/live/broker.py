@@ -33,7 +33,9 @@ class Broker:
         self._answered = threading.Event()
         self.lost = "the broker has not answered"
         self._topic, self._receive = at.topic, receive
-        self._client = _client(at)
+        self._sockets: list[Any] = []
+        self._client = _client(at, self._sockets)
+        self._client.on_socket_open = lambda *given: self._sockets.append(given[2])
         self._client.on_connect = self._connected
         self._client.on_disconnect = self._disconnected
         self._client.on_connect_fail = lambda *_: self._ended("the broker cannot be reached")
@@ -42,7 +44,11 @@ class Broker:
         try:
             self._client.connect(at.host, at.port, keepalive=15)
         except ssl.SSLError as error:
+            self._let_go()
             raise OSError(f"TLS fails: {error.reason or error}") from error
+        except OSError:
+            self._let_go()
+            raise
         except ValueError as error:
             raise OSError(str(error)) from error
         self._client.loop_start()
@@ -67,6 +73,12 @@ class Broker:
         """Say goodbye."""
         self._client.disconnect()
         self._client.loop_stop()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Close the sockets that the library leaves open where a connection fails."""
+        for each in self._sockets:
+            each.close()
 
     def _connected(self, client: Client, _: Any, __: Any, reason: Any, ___: Any = None) -> None:
         """The broker's answer: go on to subscribe, where messages are to be received."""
@@ -103,8 +115,8 @@ class Broker:
             self._receive(message.payload)
 
 
-def _client(at: Mqtt) -> Client:
-    """A client that is not connected yet."""
+def _client(at: Mqtt, sockets: list[Any]) -> Client:
+    """A client that is not connected yet; ``sockets`` receives those with TLS."""
     try:
         from paho.mqtt import client as paho
         from paho.mqtt.enums import CallbackAPIVersion
@@ -124,6 +136,13 @@ def _client(at: Mqtt) -> Client:
             raise InputError(
                 at.ca, f"cannot be read ({error}), expected certificates to trust (PEM)"
             ) from error
+        wrap = context.wrap_socket
+
+        def remembered(*arguments: Any, **keywords: Any) -> ssl.SSLSocket:
+            sockets.append(wrap(*arguments, **keywords))
+            return sockets[-1]  # type: ignore[no-any-return]
+
+        context.wrap_socket = remembered  # type: ignore[method-assign]
         client.tls_set_context(context)
     return client
 

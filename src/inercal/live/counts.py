@@ -99,14 +99,19 @@ class Stamps:
                 self.lost -= 1  # it was not lost, only late
         elif math.isfinite(step):
             self._rows += 1
-            if step > 1.5 * self._interval:
-                self.lost += round(step / self._interval) - 1
+            self.lost += self._missing(step)
             self._steps.append(step)
-            if len(self._steps) == _STEPS and (self._rows % _STEPS == 0 or math.isnan(self._interval)):
-                self._interval = statistics.median(self._steps)
+            if len(self._steps) == _STEPS and self._rows % _STEPS == 0:
+                first, self._interval = math.isnan(self._interval), statistics.median(self._steps)
+                if first:
+                    self.lost += sum(self._missing(each) for each in self._steps)
         self._newest = max(self._newest, t)
         if arrived is not None:
             self._timed(arrived - t, arrived)
+
+    def _missing(self, step: float) -> int:
+        """Rows that are missing in a step [s], once the interval is known."""
+        return round(step / self._interval) - 1 if step > 1.5 * self._interval else 0
 
     def _timed(self, delay: float, arrived: float) -> None:
         """Compare a delay, but for a constant, with the least of the last minute or two: clocks drift."""

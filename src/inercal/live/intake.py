@@ -120,6 +120,8 @@ class Intake:
                     self._say(f"{self._source}: nothing has come for {SILENCE:g} s")
         except InercalError as error:
             self.failure = error
+        except Exception as error:
+            self.failure = InputError(self._source, f"fails: unexpected {type(error).__name__} ({error})")
         finally:
             self._close()
             with self._change:

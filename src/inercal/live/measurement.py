@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from inercal.errors import InercalError, InputError
+from inercal.errors import InercalError, InputError, RecordError
 from inercal.findings import Finding
 from inercal.live.address import Sink, Source, sink_of, source_of
 from inercal.live.counts import Counts, SinkCounts
@@ -215,15 +215,23 @@ class Measurement:
             source = plan.source
             feed = Feed(self._intake, plan.record_map, may_begin_within_a_row(source), record, self._said)
             closing.callback(self._close_outlets)
+            for sink in plan.sinks:
+                self._outlets.append(Outlet(sink, self._print, self._said))
             closing.callback(self._intake.end)
             self._intake.begin()
             self._feed, self.state = feed, "waiting"
-            lines = Lines(feed, str(source), feed.record_map, self._found)  # type: ignore[arg-type]
+            try:
+                lines = Lines(feed, str(source), feed.record_map, self._found)  # type: ignore[arg-type]
+            except RecordError:
+                if self._stop.is_set():
+                    return  # before a row came
+                raise
             if not lines.stamped and feed.missing is None and is_datagrams(source):
                 self._said("rows have neither stamps nor a counter: what is lost cannot be seen")
             estimator = Watched(make(lines), self._watch, lines, feed)
             self.columns = tuple(estimator.columns)
-            self._outlets = [Outlet(sink, self.columns, self._print, self._said) for sink in plan.sinks]
+            for outlet in self._outlets:
+                outlet.begin(self.columns)
             self.state = "running"
             saving = plan.saving
             if saving is not None:

@@ -26,8 +26,9 @@ class PieceFiles:
     Raises `InputError` where the folder cannot be made, `MissingExtraError` for Parquet without pyarrow.
     """
 
-    def __init__(self, sink: Pieces, columns: Sequence[str]) -> None:
-        self._folder, self._columns = sink.folder, list(columns)
+    def __init__(self, sink: Pieces) -> None:
+        self._folder = sink.folder
+        self._columns: Sequence[str] = ()
         self._suffix, self._form = (".parquet", _parquet) if sink.form == "parquet" else (".h5", _hdf5)
         if sink.form == "parquet":
             try:
@@ -47,6 +48,10 @@ class PieceFiles:
     def held(self) -> int:
         """Rows of the piece that is not written yet."""
         return len(self._rows)
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Take the titles."""
+        self._columns = columns
 
     def write(self, rows: Sequence[Row]) -> int:
         """Hold rows until a piece is full."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
-from inercal.errors import InercalError, InputError
+from inercal.errors import InputError
 from inercal.live.address import Mqtt, Pieces, Sink, Text, Udp
 from inercal.live.broker import Broker
 from inercal.live.counts import SinkCounts, Spread
@@ -34,6 +34,9 @@ class Writer(Protocol):
     def held(self) -> int:
         """Rows that were taken and are not out yet."""
 
+    def begin(self, columns: Sequence[str]) -> None:
+        """Take the titles of the rows, before the first of them."""
+
     def write(self, rows: Sequence[Row]) -> int:
         """Take rows, perhaps none, some time after the last call; how many were delivered."""
 
@@ -50,8 +53,6 @@ class Outlet:
     Parameters
     ----------
     sink : Sink
-    columns : sequence of str
-        Titles of the values of a row.
     print_line : callable
         Takes lines for standard output.
     say : callable
@@ -66,22 +67,27 @@ class Outlet:
     def __init__(
         self,
         sink: Sink,
-        columns: Sequence[str],
         print_line: Callable[[str], None],
         say: Callable[[str], None],
     ) -> None:
         self.name, self._say = str(sink), say
         try:
-            self._writer = _writer(sink, columns, print_line, say)
+            self._writer = _writer(sink, print_line, say)
         except OSError as error:
             raise InputError(sink, f"cannot be opened ({error.strerror or error})") from error
         self._rows: deque[Row] = deque()
         self._change = threading.Condition()
         self._busy, self._closing, self._settled, self._asked_to_settle = False, False, True, False
+        self._columns: Sequence[str] = ()
+        self._begun = False
         self._written = self._dropped = 0
         self._times = Spread()
         self.failure = ""
         self._thread = threading.Thread(target=self._work, name=f"sink {sink}", daemon=True)
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Begin to take rows of these columns."""
+        self._columns, self._begun = columns, True
         self._thread.start()
 
     def offer(self, row: Row) -> None:
@@ -109,7 +115,10 @@ class Outlet:
         with self._change:
             self._closing = True
             self._change.notify_all()
-        self._thread.join(GOODBYE)
+        if self._thread.is_alive():
+            self._thread.join(GOODBYE)
+        elif not self._begun:
+            self._writer.close()
         with self._change:
             self._dropped += len(self._rows)
             self._rows.clear()
@@ -129,10 +138,11 @@ class Outlet:
     def _work(self) -> None:
         """Write rows as they come."""
         try:
+            self._writer.begin(self._columns)
             while not self._closing or self._rows:
                 self._some()
             self._writer.close()
-        except (OSError, InercalError, ValueError) as error:
+        except Exception as error:  # whatever a library makes of it: the others go on
             why = (error.strerror if isinstance(error, OSError) else "") or str(error)
             with self._change:
                 self.failure = why
@@ -141,7 +151,7 @@ class Outlet:
                 self._rows.clear()
                 self._change.notify_all()
             self._say(f"{self.name}: takes no more rows ({why})")
-            with suppress(OSError, InercalError, ValueError):
+            with suppress(Exception):
                 self._writer.close()
 
     def _some(self) -> None:
@@ -170,21 +180,19 @@ class Outlet:
                 self._change.notify_all()
 
 
-def _writer(
-    sink: Sink, columns: Sequence[str], print_line: Callable[[str], None], say: Callable[[str], None]
-) -> Writer:
+def _writer(sink: Sink, print_line: Callable[[str], None], say: Callable[[str], None]) -> Writer:
     """The writer of a sink."""
     match sink:
         case Text(file=None):
-            return _Printed(columns, print_line)
+            return _Printed(print_line)
         case Text():
-            return _TextFile(sink, columns)
+            return _TextFile(sink)
         case Pieces():
-            return PieceFiles(sink, columns)
+            return PieceFiles(sink)
         case Udp():
-            return _Datagrams(sink, columns)
+            return _Datagrams(sink)
         case Mqtt():
-            return _Messages(sink, columns, say)
+            return _Messages(sink, say)
 
 
 class _Printed:
@@ -192,8 +200,11 @@ class _Printed:
 
     held = 0
 
-    def __init__(self, columns: Sequence[str], print_line: Callable[[str], None]) -> None:
+    def __init__(self, print_line: Callable[[str], None]) -> None:
         self._print = print_line
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Print the titles."""
         self._print(",".join(columns))
 
     def write(self, rows: Sequence[Row]) -> int:
@@ -214,8 +225,11 @@ class _TextFile:
 
     held = 0
 
-    def __init__(self, sink: Text, columns: Sequence[str]) -> None:
+    def __init__(self, sink: Text) -> None:
         self._file = new_file(str(sink.file))
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Write the titles."""
         os.write(self._file, f"{','.join(columns)}\n".encode())
 
     def write(self, rows: Sequence[Row]) -> int:
@@ -253,11 +267,15 @@ class _Datagrams:
 
     held = 0
 
-    def __init__(self, sink: Udp, columns: Sequence[str]) -> None:
+    def __init__(self, sink: Udp) -> None:
         self._address: Any
         family, _, _, _, self._address = socket.getaddrinfo(sink.host, sink.port, type=socket.SOCK_DGRAM)[0]
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._titles, self._due = f"{','.join(columns)}\n".encode(), -math.inf
+        self._titles, self._due = b"", -math.inf
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Take the titles."""
+        self._titles = f"{','.join(columns)}\n".encode()
 
     def write(self, rows: Sequence[Row]) -> int:
         """Send them; nobody may be listening."""
@@ -289,11 +307,15 @@ class _Messages:
 
     held = 0
 
-    def __init__(self, sink: Mqtt, columns: Sequence[str], say: Callable[[str], None]) -> None:
+    def __init__(self, sink: Mqtt, say: Callable[[str], None]) -> None:
         self._at, self._say = sink, say
-        self._columns = columns
+        self._columns: Sequence[str] = ()
         self._broker: Broker | None = Broker(sink)
         self._pause, self._due = 0.5, 0.0
+
+    def begin(self, columns: Sequence[str]) -> None:
+        """Take the titles."""
+        self._columns = columns
 
     def write(self, rows: Sequence[Row]) -> int:
         """Publish them; those that the broker has not confirmed when it goes are lost, and counted."""

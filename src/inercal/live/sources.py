@@ -9,6 +9,7 @@ import struct
 import sys
 from typing import Any, NamedTuple, Protocol
 
+from inercal._files import is_pipe
 from inercal.errors import MissingExtraError, RecordError
 from inercal.live.address import Mqtt, Replay, Serial, Source, Tcp, Udp
 from inercal.live.broker import Broker
@@ -175,6 +176,8 @@ class _Replay:
     """A recording, packed or not."""
 
     def __init__(self, at: Replay) -> None:
+        if is_pipe(at.file):
+            raise RecordError(at.file, "is a pipe or a device, expected a recording in a file")
         try:
             with at.file.open("rb") as file:
                 packed = file.read(2) == b"\x1f\x8b"
