@@ -1,4 +1,4 @@
-"""How many units and runs a second? By one process, by two and four, and by a cluster of two workers of dask.
+"""How many units and runs a second? By one process, by two, and by a cluster of two workers of dask.
 
     python benchmarks/fleets.py [--quick]
 
@@ -87,7 +87,7 @@ def more(
 
 def rows(quick: bool) -> list[Row]:
     units, rounds, chunks = (4, 1, 50) if quick else (400, 2, 3000)
-    some, repeats = ((2, 4), 1) if quick else ((100, 400), 3)
+    some, repeats = ((2, 4), 1) if quick else ((50, 200), 2)
     study = load_selfcal_study(FOLDER / "selfcal.toml")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -121,7 +121,6 @@ def rows(quick: bool) -> list[Row]:
             {
                 "one": lambda: done(1),
                 "two": lambda: done(2),
-                "four": lambda: done(4),
                 "cluster": lambda: done(2, LOCAL),
             },
             rounds,
@@ -133,7 +132,6 @@ def rows(quick: bool) -> list[Row]:
         return [
             row("A fleet, one process", size, unit, found["one"]),
             row("A fleet, --workers 2", size, unit, found["two"], "one process", found["one"]),
-            row("A fleet, --workers 4", size, unit, found["four"], "one process", found["one"]),
             row("A fleet, --cluster local of two", size, unit, found["cluster"], "--workers 2", found["two"]),
             *more("A unit more", at, some, repeats),
             *more("A run more", simulated, some, repeats),

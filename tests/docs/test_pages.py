@@ -37,6 +37,7 @@ SLOW = [
     "docs/how-to/several-records.md",
     "docs/how-to/temperature.md",
     "docs/how-to/tolerances-from-a-goal.md",
+    "docs/how-to/use-a-cluster.md",
     "docs/how-to/validate.md",
     "docs/published/continuous-self-calibration.md",
     "docs/published/zhao-2023.md",

@@ -67,7 +67,8 @@ def cluster(folder, workers=2, ttl="30s", failures="3"):
         while not file.exists():
             time.sleep(0.05)
         processes += [worker() for _ in range(workers)]
-        _wait_for(file, workers)
+        if workers:
+            _wait_for(file, workers)
         yield str(file), processes, worker
     finally:
         for each in processes:
@@ -112,7 +113,10 @@ def quiet(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_campaign_has_the_digits_of_one_process(quiet, expected):
-    found = run(noise, runs=RUNS, seed=SEED, executor=Cluster(quiet), chunk=1)["x"]
+    with open(quiet) as file:
+        address = json.load(file)["address"]
+    assert address.startswith("tcp://")
+    found = run(noise, runs=RUNS, seed=SEED, executor=Cluster(address), chunk=1)["x"]
     assert np.array_equal(found, expected)
 
 
@@ -169,7 +173,7 @@ def coefficients(path):
 @pytest.mark.slow
 def test_a_worker_that_is_killed_and_one_that_hangs_lose_nothing(tmp_path, expected):
     """One is killed in the middle, one stopped; another comes: same digits, every run once."""
-    with cluster(tmp_path, ttl="3s") as (file, processes, worker):
+    with cluster(tmp_path, ttl="8s") as (file, processes, worker):
         seen = []
 
         def progress(done, runs):
@@ -208,6 +212,13 @@ def test_a_scheduler_that_is_killed_ends_the_command_which_goes_on_later(tmp_pat
     done = len(list(kept.glob("chunk-*.npz")))
     assert 7 <= done < RUNS
     assert np.array_equal(run(noise, runs=RUNS, seed=SEED, chunk=1, folder=kept)["x"], expected)
+
+
+@pytest.mark.slow
+def test_no_worker_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr("inercal.estimate.cluster._PATIENCE", 2.0)
+    with cluster(tmp_path, 0) as (file, _, _), pytest.raises(InputError, match="found no worker"):
+        run(noise, runs=1, seed=SEED, executor=Cluster(file))
 
 
 def test_no_scheduler_is_one_sentence(tmp_path):

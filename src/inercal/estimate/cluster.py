@@ -44,7 +44,7 @@ _AGAIN = 5
 """Times that a chunk is done again whose answer was lost on the way."""
 
 _PATIENCE = 15.0
-"""Time [s] within which a scheduler must answer."""
+"""Time [s] within which a scheduler must answer and a worker must be there."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,10 @@ def _client(cluster: Cluster) -> Iterator[Any]:
             "--cluster", f"{where}: no scheduler answers ({type(error).__name__}), expected one at work there"
         ) from error
     with client:
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except TimeoutError as error:
+            raise InputError("--cluster", f"{where}: found no worker, expected one at work there") from error
         yield client
 
 
