@@ -18,7 +18,7 @@ version = release = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "generated"]
 # MathJax as it is published, in a package of its own: the book is read without a network
 _MATHJAX = distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static")
-exclude_patterns = ["pictures"]
+exclude_patterns = ["paper", "pictures"]
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

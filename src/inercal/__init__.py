@@ -3,7 +3,7 @@
 This page defines the words. Nothing here computes. In Python, ``import inercal as ic`` brings one verb for each task:
 ``ic.read``, ``ic.record``, ``ic.study``, ``ic.calibrate``, ``ic.runs``, ``ic.simulate``, ``ic.design``,
 ``ic.sensitivity``, ``ic.allan``, ``ic.temperature``, ``ic.compare``, ``ic.apply``, ``ic.load``, ``ic.keep``,
-``ic.history``; each has an example in its ``help``.
+``ic.history``, ``ic.batch``; each has an example in its ``help``.
 
 Frames, signs, units
     SI and radians inside. Another unit is written into a name (``bias_deg_per_h``) or beside a number at the
@@ -108,7 +108,7 @@ if TYPE_CHECKING:
     from inercal.fleet.batch import batch as batch
     from inercal.records.record import Record as Record
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 #: public name -> module that defines it; resolved when first asked for (PEP 562), so that importing is quick
 _WHERE = {

@@ -91,6 +91,16 @@ def test_a_scale_and_a_bias():
     assert float(re.match(r"the bias of a2 looks to be (\S+) mg", message)[1]) == pytest.approx(5.0, abs=0.4)
 
 
+def test_a_bias_of_the_gyro_beyond_its_prior():
+    swung = study(motion=replace(BASE, mean=15.0 * DEG, duration=12.0, sample_rate=500.0))
+    recording = recorded(swung)
+    code, message = said(replace(recording, gyro=recording.gyro + 0.1 * DEG), swung)
+    assert code == "prior_suspect"
+    # its own bias is of 5 deg/h
+    number = float(re.match(r"the bias of the gyro looks to be (\S+) deg/h", message)[1])
+    assert number == pytest.approx(360.0, abs=20.0)
+
+
 def test_one_angle_cannot_tell_and_says_so():
     rest = study(motion=MotionPlan("static", duration=3.0, first=10.0 * DEG, last=10.0 * DEG))
     recording = recorded(rest)

@@ -115,7 +115,9 @@ def pages(book):
 @pytest.mark.slow
 def test_every_page_is_in_the_book_and_can_be_reached_from_the_front(pages):
     written = {
-        file.relative_to(ROOT / "docs").with_suffix("").as_posix() for file in ROOT.glob("docs/**/*.md")
+        file.relative_to(ROOT / "docs").with_suffix("").as_posix()
+        for file in ROOT.glob("docs/**/*.md")
+        if file.parent.name != "paper"  # a journal sets it
     }
     assert written == pages.keys() - {"genindex", "py-modindex", "search"}
     reached, ahead = set(), ["index"]

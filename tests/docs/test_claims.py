@@ -17,6 +17,7 @@ PAGE = ROOT / "docs" / "claims.md"
 NO_CLAIMS = {"Try it", "Goals and non-goals"}
 #: sentences that claim nothing, by their first words: for whom it is, what to do, and links
 SILENT = (
+    "New here:",
     "For inertial-test engineers",
     "Hold the IMU still",
     "Then",

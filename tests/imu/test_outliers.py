@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from independent import imu
 from independent_recordings import SETTINGS, calibrated
+from recordings import record_of
 from scipy.stats import binom, chi2
 
 from inercal.errors import StudyError
 from inercal.findings import Status
 from inercal.imu.figures import pictures
+from inercal.imu.multiposition.calibration import calibrate_multiposition
 from inercal.imu.multiposition.deletion import LinearFit, held_out, outlying
 from inercal.imu.settings import Exclusion
 from inercal.studies.imu import imu_study
@@ -113,6 +115,19 @@ def test_a_pose_that_was_pushed_is_named_and_left_out():
     assert [row["from_pose"] for row in without.estimate.result["turns"]] == numbers[:-1]
     assert without.estimate.status is Status.OK
     assert np.max(np.abs(error)) < 5.0
+
+
+def test_poses_beyond_the_range_of_the_accelerometers_are_named():
+    """Outputs that end at 9 m/s^2, as those of a range of +-0.9 g, are short of 1 g upright."""
+    rng = np.random.default_rng(SOUND)
+    made = imu.unit(rng)
+    t, acc, gyro = imu.record(rng, made, imu.random_ups(rng, 24))
+    cut = record_of(t, np.clip(acc, -9.0, 9.0), gyro, "m/s^2", "rad/s")
+    estimate = calibrate_multiposition(cut, SETTINGS).estimate
+    assert estimate.status is Status.SUSPECT
+    (finding,) = (f for f in estimate.findings if f.code == "saturation" and f.harm)
+    # up at the start, along z
+    assert "in poses 1, " in finding.message
 
 
 @for_each(

@@ -59,6 +59,7 @@ def test_the_xsens_files_are_read_as_counts_on_their_clock(tmp_path):
     [
         "time,ax,ay,az,gx,gy,gz",
         "t,accX,accY,accZ,gyrX,gyrY,gyrZ",
+        "elapsed,AcX,AcY,AcZ,GyX,GyY,GyZ",
         "timestamp,imu.acc.x,imu.acc.y,imu.acc.z,imu.gyro.x,imu.gyro.y,imu.gyro.z",
         "Zeit (s),ax (m/s2),ay (m/s2),az (m/s2),wx (rad/s),wy (rad/s),wz (rad/s)",
         "Time [s],Accel_X,Accel_Y,Accel_Z,Gyro_X,Gyro_Y,Gyro_Z",
@@ -156,6 +157,27 @@ def test_a_table_and_a_model_have_names_of_their_own(tmp_path):
     pitching = table(tmp_path / "b.csv", "time,AX,AY,AZ,gyro_y,gyro_z", rows)
     of_model = tomllib.loads(guess_map(pitching, of_model=True))["columns"]
     assert list(of_model) == ["t", "a1", "a2", "a3", "gyro", "gyro_yaw"]
+
+
+def test_sensors_whose_names_say_nothing_go_by_their_norm(tmp_path):
+    """A table's log in German: readings B of a converter, and a temperature as it counts, which is no channel."""
+    angles = np.column_stack([np.arange(1, N + 1), np.arange(N) % 7, np.arange(N) % 5])
+    rows = np.column_stack([angles, 130.0 * ACC, np.full(N, -3400.0)])
+    path = table(tmp_path / "a.txt", "Pos;Achse 1 (°);Achse 2 (°);Bx (mV);By (mV);Bz (mV);Tmp", rows, ";")
+    found = tomllib.loads(guess_map(path, on_table=True))["columns"]
+    assert list(found) == ["position", "phi1", "phi2", "acc_x", "acc_y", "acc_z"]
+    assert found["acc_z"] == {"from": "Bz (mV)", "unit": "mV"}
+
+
+def test_a_model_with_two_accelerometers_along_one_axis(tmp_path):
+    """They are numbered as they stand, and q is the rate of pitch."""
+    header = "Time[s],AX_fwd[g],AZ_fwd[g],AZ_aft[g],Q[deg/s],AoA_inclinometer[deg]"
+    path = table(tmp_path / "a.dat", header, np.column_stack([T, ACC / 9.8, GYRO[:, :2]]))
+    found = tomllib.loads(guess_map(path, of_model=True))["columns"]
+    assert [each["from"].partition("[")[0] for each in found.values()] == [
+        "Time", "AX_fwd", "AZ_fwd", "AZ_aft", "Q", "AoA_inclinometer",
+    ]  # fmt: skip
+    assert list(found) == ["t", "a1", "a2", "a3", "gyro", "theta_ref"]
 
 
 def test_without_time_or_rate_one_is_asked_for(tmp_path):

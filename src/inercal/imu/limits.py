@@ -94,6 +94,9 @@ class Limits:
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 
+    clipped_part: float = 0.1
+    """Part of the samples of a pose at the end of an accelerometer's range from which its mean counts as short."""
+
     first_guess_miss: float = 0.5
     """Miss [rad] of the first guess of the gyro beyond which no fit is tried; large misalignments leave 0.3 rad."""
 

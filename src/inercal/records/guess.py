@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,28 +12,26 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.records.channels import Origin, of_a_table
+from inercal.records.guessed_units import EVERYDAY, Guess, median, quoted, units_of
 from inercal.records.places import counted_names
 from inercal.records.read import format_of
 from inercal.records.read.table import Sample
-from inercal.records.titles import OF_A_MODEL, bare, fits, numbered, of_table, titled
+from inercal.records.titles import (
+    OF_A_MODEL,
+    bare,
+    fits,
+    numbered,
+    of_table,
+    rate_of_model,
+    titled,
+    triads_by_name,
+)
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
 _LISTED = 40
-_POSITIONS = 1000
-_EVERYDAY = ("s", "m/s^2", "deg/s", "deg", "degC", "1")
-
-
-@dataclass(frozen=True)
-class _Guess:
-    """A channel thought to be in a column: where that is, its values, a unit if it was said, and why."""
-
-    name: str
-    origin: Origin
-    values: Array
-    unit: str | None
-    reason: str
+_HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class _File:
     """Guess about one file, or about the columns of one clock in it."""
 
     path: Path
-    guesses: Mapping[str, _Guess]
+    guesses: Mapping[str, Guess]
     leading: tuple[str, ...]
     unused: tuple[str, ...] = ()
 
@@ -59,8 +56,7 @@ def guess_map(
     Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
     header by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
     a unit by the size of gravity. Of a test ``on_table`` columns without names are not guessed, for angles and outputs
-    look alike; nor those ``of_model`` that pitches, whose accelerometers are ``a1`` to ``an`` by
-    their numbers or axes.
+    look alike; nor those ``of_model`` that pitches, whose accelerometers are ``a1`` to ``an`` by their numbers or axes.
 
     ``rate`` is the sample rate, as text with its unit, where there is no time column. The map is TOML that reads these
     files, with a comment on each guess and on columns not used. Where no sensor was recognised, there are only
@@ -76,7 +72,7 @@ def guess_map(
         return _skeleton(
             files, "phi1 phi2 acc_x" if on_table else "a1 a2 gyro" if of_model else "acc_x acc_y gyro_x"
         )
-    names = dict.fromkeys(_quoted(file.path.name) for file in files)
+    names = dict.fromkeys(quoted(file.path.name) for file in files)
     lines = [
         f"# Guessed from {', '.join(names)}: check each line, above all",
         "# the units, the order of the axes and their signs.",
@@ -86,7 +82,7 @@ def guess_map(
     else:
         for file, name in zip(files, _table_names(files), strict=True):
             table = f"file.{name}"
-            lines += ["", f"[{table}]", f"path = {_quoted(file.path.name)}", *_options(file, "")]
+            lines += ["", f"[{table}]", f"path = {quoted(file.path.name)}", *_options(file, "")]
             lines += _columns(file, f"{table}.columns")
     for file in files:
         lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
@@ -115,7 +111,7 @@ def _samples(path: Path) -> Sequence[Sample]:
 def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
     """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
     samples = sorted(_samples(path), key=lambda sample: -len(sample.values))
-    lengths: dict[int, dict[str, _Guess]] = {}
+    lengths: dict[int, dict[str, Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
         named = sample.names or on_table or of_model
@@ -152,7 +148,7 @@ def _unused(samples: Sequence[Sample], files: Sequence[_File]) -> tuple[str, ...
             begins = ", ".join(f"{value:.6g}" for value in values[:3])
             if np.isnan(values).all():
                 begins = "no numbers; dates and words are not read"
-            place = _quoted(list(origin) if isinstance(origin, tuple) else origin)
+            place = quoted(list(origin) if isinstance(origin, tuple) else origin)
             columns.append(f"{place} ({begins})")
     more = [f"{len(columns) - _LISTED} more"] if len(columns) > _LISTED else []
     return (*columns[:_LISTED], *more)
@@ -161,24 +157,24 @@ def _unused(samples: Sequence[Sample], files: Sequence[_File]) -> tuple[str, ...
 def _skeleton(files: Sequence[_File], names: str) -> str:
     """A map that says nothing yet: what to write, such as these channels, and the columns there are."""
     first, *others = names.split()
-    unit = next(unit for unit in _EVERYDAY[1:] if fits(first, unit))
+    unit = next(unit for unit in EVERYDAY[1:] if fits(first, unit))
     lines = ["# No accelerometer or gyro was recognised. Give each channel its column and unit, for example"]
-    lines += [f"# [columns.{first}]", "# from = 1", f"# unit = {_quoted(unit)}", "#"]
+    lines += [f"# [columns.{first}]", "# from = 1", f"# unit = {quoted(unit)}", "#"]
     lines += [f"# and likewise t, {', '.join(others)}. Without a time column, state the rate:"]
     lines += ["# [time]", '# rate = "100 Hz"', "#", "# What there is, with the first numbers:"]
     for file in files:
-        held = [f"{_quoted(guess.origin)} (perhaps {name})" for name, guess in file.guesses.items()]
-        lines += [f"# {_quoted(file.path.name)}", *(f"#   {column}" for column in (*held, *file.unused))]
+        held = [f"{quoted(guess.origin)} (perhaps {name})" for name, guess in file.guesses.items()]
+        lines += [f"# {quoted(file.path.name)}", *(f"#   {column}" for column in (*held, *file.unused))]
     return "\n".join(lines) + "\n"
 
 
-def _by_header(sample: Sample, on_table: bool, of_model: bool) -> list[_Guess]:
+def _by_header(sample: Sample, on_table: bool, of_model: bool) -> list[Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
         name, unit = titled(title, sample.units[index] if sample.units else None)
         if of_model:
-            name = numbered(title) or OF_A_MODEL.get(name or "", name)
+            name = numbered(title) or OF_A_MODEL.get(name or "", name) or rate_of_model(title, unit)
         elif on_table:
             name = name or of_table(title)
         values = sample.values[:, index]
@@ -187,9 +183,38 @@ def _by_header(sample: Sample, on_table: bool, of_model: bool) -> list[_Guess]:
             continue
         if name == "t" and titled(bare(title))[0] != "t" and not _is_clock(values):
             continue
-        reason = f"the header says {_quoted(title)}"
-        guesses.append(_Guess(name, _origin(sample, index), values, unit, reason))
+        if name == "temperature" and unit is None and abs(median(values)) > _HOT:
+            continue
+        reason = f"the header says {quoted(title)}"
+        guesses.append(Guess(name, _origin(sample, index), values, unit, reason))
+    if of_model:
+        return _counted(guesses)
+    return guesses if any(_MEASURED.fullmatch(each.name) for each in guesses) else guesses + _by_norm(sample)
+
+
+def _counted(guesses: list[Guess]) -> list[Guess]:
+    """Accelerometers of a model by the order of their columns, where two have one number."""
+    places = [place for place, guess in enumerate(guesses) if re.fullmatch(r"a\d+", guess.name)]
+    if len({guesses[place].name for place in places}) < len(places):
+        for number, place in enumerate(places, 1):
+            reason = f"{guesses[place].reason}, accelerometer {number} in the order of the columns"
+            guesses[place] = replace(guesses[place], name=f"a{number}", reason=reason)
     return guesses
+
+
+def _by_norm(sample: Sample) -> list[Guess]:
+    """Sensors of names that say x, y, z and nothing known: the accelerometers are those whose norm is steadier."""
+    units = [
+        titled(*each)[1]
+        for each in zip(sample.names, sample.units or (None,) * len(sample.names), strict=True)
+    ]
+    able = [unit is None or fits("acc_x", unit) for unit in units]
+    found = [list(triad) for triad in triads_by_name(sample.names) if all(able[index] for index in triad)]
+    return [
+        Guess(f"{sensor}_{axis}", _origin(sample, index), sample.values[:, index], units[index], reason)
+        for sensor, triad, reason in (_sensors(sample.values, found, ()) if len(found) in (1, 2) else ())
+        for axis, index in zip("xyz", triad, strict=True)
+    ]
 
 
 def _is_clock(values: Array) -> bool:
@@ -205,12 +230,12 @@ def _origin(sample: Sample, index: int) -> Origin:
     return (sample.variable, index) if sample.variable else index
 
 
-def _by_shape(sample: Sample, path: Path) -> list[_Guess]:
+def _by_shape(sample: Sample, path: Path) -> list[Guess]:
     """Channels of an array without a header: a time that rises, and one triad or two."""
     values = sample.values
 
-    def guess(name: str, index: int, reason: str) -> _Guess:
-        return _Guess(name, _origin(sample, index), values[:, index], None, reason)
+    def guess(name: str, index: int, reason: str) -> Guess:
+        return Guess(name, _origin(sample, index), values[:, index], None, reason)
 
     rising = [index for index in range(values.shape[1]) if (np.diff(values[:, index]) > 0).all()]
     guesses = [guess("t", rising[0], "the column that always rises")] if rising else []
@@ -232,7 +257,7 @@ def _sensors(
     for name in names if len(triads) == 1 else ():
         named = [sensor for sensor, pattern in _IN_NAMES.items() if re.search(pattern, name, re.IGNORECASE)]
         if len(named) == 1:
-            return [(named[0], triads[0], f"the name says {_quoted(name)}")]
+            return [(named[0], triads[0], f"the name says {quoted(name)}")]
     spread = [_spread(values[:, triad]) for triad in triads]
     acc = int(np.argmin(spread))
     if len(triads) == 1:
@@ -247,102 +272,22 @@ def _sensors(
 def _spread(triad: Array) -> float:
     """Scatter of a triad's norm over its median."""
     norm = np.linalg.norm(triad, axis=1)
-    middle = _median(norm)
-    return _median(np.abs(norm - middle)) / middle if middle > 0 else np.inf
-
-
-def _median(values: Array) -> float:
-    """Median of the numbers there are, 0 if there are none."""
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if finite.size else 0.0
-
-
-def _units(guesses: Mapping[str, _Guess]) -> dict[str, tuple[str, str]]:
-    """Unit of each channel, and why."""
-    acc_unit = guesses["acc_x"].unit if "acc_x" in guesses else None
-    acc = (acc_unit, "as x") if acc_unit and fits("acc_x", acc_unit) else _acc_unit(guesses)
-    units = {}
-    for name, guess in guesses.items():
-        if guess.unit is not None and fits(name, guess.unit):
-            units[name] = (guess.unit, "with this unit")
-            continue
-        if name == "t":
-            by_position = of_a_table(guesses) and len(guess.values) < _POSITIONS
-            units[name] = ("s", "a row for each position") if by_position else _time_unit(guess.values)
-        elif name.startswith("acc_"):
-            units[name] = acc
-        elif name[1:].isdigit():
-            units[name] = _axes_unit(guesses)
-        elif name.startswith("gyro"):
-            units[name] = _gyro_unit(guesses, acc[0])
-        elif fits(name, "1"):
-            units[name] = ("1", "a number without a unit")
-        else:
-            units[name] = (next(unit for unit in _EVERYDAY if fits(name, unit)), "the unit is an example")
-        if guess.unit is not None and name not in ("label", "position"):
-            units[name] = (units[name][0], f"{_quoted(guess.unit)} is no unit known here; {units[name][1]}")
-    return units
-
-
-def _acc_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
-    """Unit of the accelerometers by the size of gravity."""
-    axes = [guesses[name].values for name in ("acc_x", "acc_y", "acc_z") if name in guesses]
-    if len(axes) < 3:
-        return "count", "no triad to tell the unit by"
-    norm = _median(np.linalg.norm(axes, axis=0))
-    for unit, low, high in (("m/s^2", 8.5, 11.0), ("g", 0.85, 1.15), ("mg", 850, 1150)):
-        if low < norm < high and not (unit == "mg" and _whole(axes)):
-            return unit, f"the median norm is {norm:.4g}, gravity in {unit}"
-    return "count", f"the median norm is {norm:.5g}, gravity in neither m/s^2 nor g"
-
-
-def _axes_unit(guesses: Mapping[str, _Guess]) -> tuple[str, str]:
-    """Unit of accelerometers around a model: of axes at right angles one always reads 0.7 of gravity or more."""
-    axes = [np.abs(guess.values) for name, guess in guesses.items() if name[1:].isdigit()]
-    largest = _median(np.max(axes, axis=0))
-    for unit, low, high in (("m/s^2", 6.0, 11.0), ("g", 0.6, 1.1), ("mg", 600.0, 1100.0)):
-        if low < largest < high and not _whole(axes):
-            return unit, f"the largest of all is {largest:.4g} in the median, gravity in {unit}"
-    return "count", f"the largest of all is {largest:.4g} in the median, gravity in neither m/s^2 nor g"
-
-
-def _gyro_unit(guesses: Mapping[str, _Guess], acc_unit: str) -> tuple[str, str]:
-    """Unit of the gyros: counts if they are whole numbers, else by the largest rate."""
-    axes = [guess.values for name, guess in guesses.items() if name.startswith("gyro")]
-    if _whole(axes):
-        return "count", "all are whole numbers"
-    if acc_unit == "count" and "acc_x" in guesses:
-        return "count", "as the accelerometers"
-    largest = max(np.abs(axis[np.isfinite(axis)]).max(initial=0.0) for axis in axes)
-    unit = "mdeg/s" if largest > 5700.0 else "deg/s" if largest > 35.0 else "rad/s"
-    return unit, f"the largest is {largest:.4g}; check whether mdeg/s, deg/s or rad/s"
-
-
-def _whole(axes: Iterable[Array]) -> bool:
-    """True if all numbers are whole ones, as those of a converter are."""
-    return all((axis[np.isfinite(axis)] % 1.0 == 0.0).all() for axis in axes)
-
-
-def _time_unit(t: Array) -> tuple[str, str]:
-    """Unit of the time by its interval: inertial instruments are read some 1 to 10 000 times a second."""
-    steps = np.diff(t)
-    interval = _median(steps[steps > 0])
-    unit = next(
-        unit for unit, limit in (("s", 2.0), ("ms", 500.0), ("us", 5e5), ("ns", np.inf)) if interval < limit
-    )
-    return unit, f"the interval is {interval:.6g}"
+    middle = median(norm)
+    return median(np.abs(norm - middle)) / middle if middle > 0 else np.inf
 
 
 def _columns(file: _File, table: str) -> list[str]:
     """The columns of a file as TOML."""
-    units = _units(file.guesses)
+    units = units_of(file.guesses)
     lines = []
     for name, guess in file.guesses.items():
         unit, reason = units[name]
         comment = guess.reason if name == "label" else f"{guess.reason}; {reason}"
+        if name[1:].isdigit() and name[0] == "a":
+            comment += f"; say under [sensors.{name}] of the study where it sits and points"
         origin = list(guess.origin) if isinstance(guess.origin, tuple) else guess.origin
-        lines += ["", f"# {comment}", f"[{table}.{name}]", f"from = {_quoted(origin)}"]
-        lines += [] if name == "label" else [f"unit = {_quoted(unit)}"]
+        lines += ["", f"# {comment}", f"[{table}.{name}]", f"from = {quoted(origin)}"]
+        lines += [] if name == "label" else [f"unit = {quoted(unit)}"]
     return lines
 
 
@@ -350,20 +295,20 @@ def _options(file: _File, table: str) -> list[str]:
     """The layout of a file as TOML, as far as it is not found out on reading."""
     if not file.leading:
         return []
-    lines = [f"skip = {len(file.leading)}", f"# the first of these lines is {_quoted(file.leading[0][:60])}"]
+    lines = [f"skip = {len(file.leading)}", f"# the first of these lines is {quoted(file.leading[0][:60])}"]
     return ["", f"[{table}]", *lines] if table else lines
 
 
 def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
     """The sample rate as TOML, where there is no time column: as stated, or as a line of the file says."""
     if rate is not None:
-        return ["", "# there is no time column", "[time]", f"rate = {_quoted(rate)}"]
+        return ["", "# there is no time column", "[time]", f"rate = {quoted(rate)}"]
     sentence = next((line for line in leading if _RATE.search(line)), None)
     match = _RATE.search(sentence) if sentence is not None else None
     if sentence is not None and match:
         return [
             "",
-            f"# there is no time column; a line says {_quoted(sentence[:60])}",
+            f"# there is no time column; a line says {quoted(sentence[:60])}",
             "[time]",
             f'rate = "{match[1]} Hz"',
         ]
@@ -378,9 +323,3 @@ def _table_names(files: Sequence[_File]) -> list[str]:
         name = sensors.pop() if sensors in ({"acc"}, {"gyro"}) else f"part{number}"
         names.append(name if name not in names else f"part{number}")
     return names
-
-
-def _quoted(value: object) -> str:
-    """A number, text or list as TOML writes it; bytes in file names that no encoding knew as far as possible."""
-    text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from inercal.errors import QuantityError, RecordError
 from inercal.records.channels import Channel, Origin, is_channel, misfit, needs_unit
@@ -66,16 +66,20 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
 _SENSORS = {
     "wc": r"wc|(?:cmd|command|commanded)(?: (?:rate|angular rate|omega|w))?",
     "th": r"th|theta|gimbal|gimbal angle|encoder|encoder angle|enc",
-    "acc": r"a|f|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha|beschl"
+    "acc": r"a|f|ac|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha|beschl"
     r"|beschleunigung",
-    "gyro": r"g|w|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",
+    "gyro": r"g|w|gy|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",
 }
-_TIME = r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds"
+_TIME = (
+    r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|millis|micros"
+    r"|elapsed(?: time)?"
+)
 #: channels of a model that pitches -> names
 _OF_A_MODEL = (
     (
         "theta_ref",
-        r"(?:theta|alpha|ao ?a|pitch|angle|incidence) (?:ref|reference)|(?:ref|reference) (?:angle|theta|alpha)",
+        r"(?:theta|alpha|ao ?a|pitch|angle|incidence) (?:ref|reference|true|inclinometer|encoder)"
+        r"|(?:ref|reference) (?:angle|theta|alpha)|inclinometer",
     ),
     ("gyro_roll", r"roll (?:rate|gyro)|gyro roll"),
     ("gyro_yaw", r"yaw (?:rate|gyro)|gyro yaw"),
@@ -90,8 +94,9 @@ OF_A_MODEL = {
 
 #: channels on a turntable, base first -> names
 _OF_A_TABLE = (
-    ("phi1", r"outer|axis 1"),
-    ("phi2", r"inner|axis 2"),
+    ("phi1", r"outer|axis 1|achse 1"),
+    ("phi2", r"inner|axis 2|achse 2"),
+    ("position", r"pos"),
     ("y_x", r"(?:out|output|reading|signal) x"),
     ("y_y", r"(?:out|output|reading|signal) y"),
 )
@@ -145,6 +150,25 @@ def numbered(title: str) -> str | None:
     return f"a{match[1]}" if match else None
 
 
+def rate_of_model(title: str, unit: str | None) -> str | None:
+    """The channel of a model's gyro by the letter that aerodynamicists give its rate, p, q or r, with its unit."""
+    letter = _words(bare(title)) if unit is not None and fits("gyro", unit) else ""
+    return {"p": "gyro_roll", "q": "gyro", "r": "gyro_yaw"}.get(letter)
+
+
+def triads_by_name(names: Sequence[str]) -> list[tuple[int, int, int]]:
+    """Numbers of columns whose names differ in x, y, z alone, as ``Bx (mV)``, ``By (mV)``, ``Bz (mV)``."""
+    found = []
+    for index, name in enumerate(names):
+        for x in re.finditer("[xX]", name[:TITLE]):
+            axes = "xyz" if x[0] == "x" else "XYZ"
+            alike = [name[: x.start()] + axis + name[x.end() :] for axis in axes]
+            if all(names.count(each) == 1 for each in alike):
+                found.append((index, names.index(alike[1]), names.index(alike[2])))
+                break
+    return found
+
+
 def of_table(title: str) -> str | None:
     """The channel of a table of two axes, or of the instrument on it, by titles such as ``Inner axis`` or ``Out X``."""
     words = _words(re.sub(r"\s*[\[(].*", "", title[:TITLE]))
@@ -194,7 +218,7 @@ def _named(title: str) -> str | None:
         *_OF_A_MODEL,
         ("t", _TIME),
         ("label", _LABEL),
-        ("temperature", r"temp|temperature|temperatur"),
+        ("temperature", r"temp|tmp|temperature|temperatur"),
         ("position", "position"),
     ):
         if re.fullmatch(rf"(?:.* )?(?:{names})", words):

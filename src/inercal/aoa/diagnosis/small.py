@@ -73,6 +73,8 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     for error in (_axis, _scale, _bias, _position):
         for k in there:
             yield error(settings, k)
+    if np.isfinite(recording.gyro).any():
+        yield _gyro_bias()
     yield _pivot()
     yield _gravity(settings)
     if not recording.spatial:
@@ -144,6 +146,20 @@ def _read(recording: Recording, k: int, scale: float = 1.0, bias: float = 0.0) -
     acc = recording.acc.copy()
     acc[:, k] = (acc[:, k] - bias) / scale
     return replace(recording, acc=acc)
+
+
+def _gyro_bias() -> Hypothesis[Case]:
+    """A gyro whose readings are too large by the value [rad/s]."""
+
+    def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
+        return replace(recording, gyro=recording.gyro - value), settings
+
+    def says(value: float) -> str:
+        size = 3600.0 * math.degrees(abs(value))
+        what = f"the bias of the gyro looks to be {math.copysign(size, value):.4g} deg/h"
+        return f'{what}: write gyro_bias = "{size:.4g} deg/h" under [noise], or take it off'
+
+    return _error("bias gyro", "prior_suspect", without, says, 1e-6, 0.1)
 
 
 def _position(settings: AoaSettings, k: int) -> Hypothesis[Case]:

@@ -21,7 +21,13 @@ from inercal.imu.multiposition.outcome import assemble, uncertainty_of, without_
 from inercal.imu.multiposition.outliers import Outliers, outlier_finding, outliers_of
 from inercal.imu.multiposition.poses import Poses, choose, excluded, refitted, sweep
 from inercal.imu.multiposition.squares import squares_finding
-from inercal.imu.multiposition.verdict import axis_findings, gyro_findings, rms_miss, scatter_findings
+from inercal.imu.multiposition.verdict import (
+    axis_findings,
+    clipped_poses,
+    gyro_findings,
+    rms_miss,
+    scatter_findings,
+)
 from inercal.imu.recording import Recording, clipped_rows, prepare
 from inercal.imu.second_order import k2_size
 from inercal.imu.settings import Exclusion, ImuSettings
@@ -113,7 +119,8 @@ def _fit(
     scatter = _scatter(poses)
     gyro, of_gyro = _calibrate_gyro(recording, poses, scatter, settings, left_out)
     joint = join(poses.accelerometer, gyro)
-    return _Fitted(poses, scatter, gyro, joint, [*scatter_findings(poses, scatter), *of_gyro])
+    findings = [*scatter_findings(poses, scatter), *clipped_poses(poses, scatter, recording), *of_gyro]
+    return _Fitted(poses, scatter, gyro, joint, findings)
 
 
 def _outlier_finding(

@@ -21,6 +21,7 @@ from inercal.imu.multiposition.joint import Scatter
 from inercal.imu.multiposition.poses import Poses
 from inercal.imu.recording import Recording, unit_words
 from inercal.imu.turns import Turns, first_guess
+from inercal.records.checks.values import saturated
 from inercal.records.places import counted
 
 
@@ -129,6 +130,28 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
             "noise at rest explains (the instrument was not quite still, or the model lacks a term); the "
             "uncertainties use the scatter",
             harm=(),
+        )
+
+
+def clipped_poses(poses: Poses, scatter: Scatter, recording: Recording) -> Iterator[Finding]:
+    """Accelerometers that sit at the end of their range in a pose, so that its mean is short."""
+    if not scatter.excess:
+        return
+    triad, short = recording.accelerometer, list[int]()
+    for values in triad.values.T:
+        at_end = np.zeros(len(values), dtype=bool)
+        at_end[saturated(values)] = True
+        parts = [dwell.of(at_end).mean() for dwell in poses.dwells]
+        short += [
+            number for number, part in zip(poses.numbers, parts, strict=True) if part > LIMITS.clipped_part
+        ]
+    if short:
+        words = ", ".join(map(str, sorted(set(short))))
+        yield Finding(
+            "saturation",
+            f"accelerometers sit at the end of their range in poses {words}, whose means are short: leave them out "
+            "(imu.exclude), or record once more with a wider range",
+            harm=EVERYTHING,
         )
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import Fits, Hypothesis, search
 from inercal.turntable.limits import LIMITS
-from inercal.turntable.positions.faults import Fault, faults
+from inercal.turntable.positions.faults import Fault, faults, reading
 from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Regression
 from inercal.turntable.weights import whitened
@@ -113,10 +113,12 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
     asked, significant = first, list[Tested]()
     while True:
         tested = _likely(fit, noise, asked, residuals)
-        if not tested or tested[0].chance > risk or len(significant) == MOST:
+        likeliest = [*tested[:1], *_stray(means, fit, noise, risk)]
+        found = min(likeliest, key=lambda each: each.chance, default=None)
+        if found is None or found.chance > risk or len(significant) == MOST:
             break
-        significant.append(tested[0])
-        fit = _refitted(fit, noise, tested[0].seen)
+        significant.append(found)
+        fit = _refitted(fit, noise, found.seen)
         names = {each.fault.name for each in significant}
         asked, residuals = _seen(fit, (each for each in faults(means, fit) if each.name not in names), risk)
     if not first_fit.effects.free.size + first_fit.effects.random.size:
@@ -162,6 +164,26 @@ def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> I
         if each.chance < LIMITS.dwell_risk / len(tested) and each.fault.code not in named:
             named.add(each.fault.code)
             yield each
+
+
+def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk: float) -> list[Tested]:
+    """The reading that lies furthest off all others, with its chance among so many; none where each is needed."""
+    weight = fit.weights(fit.noise)
+    n, c, _ = fit.rows.shape
+    white = whitened(fit.rows, fit.residuals, weight)
+    Q = np.linalg.qr(white.rows)[0]
+    left = (white.right - (Q @ (Q.T @ np.append(white.right, np.zeros(len(Q) - n * c))))[: n * c]).reshape(
+        n, c
+    )
+    own = np.eye(c) - np.einsum("nap,nbp->nab", *[Q[: n * c].reshape(n, c, -1)] * 2)
+    free = np.linalg.eigvalsh(own)[:, 0] > SEEN
+    if len(means.times) < 3 or not free.any():
+        return []
+    score = np.full(n, -np.inf)
+    score[free] = np.einsum("na,na->n", left[free], np.linalg.solve(own[free], left[free][..., None])[..., 0])
+    seen, _ = _seen(fit, [reading(means, int(np.argmax(score)))], risk)
+    tested = f_test(fit, noise, seen[0])
+    return [replace(tested, chance=min(1.0, n * tested.chance))]
 
 
 def _likely(

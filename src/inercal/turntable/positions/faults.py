@@ -101,6 +101,15 @@ def _one(column: Array, channel: int, channels: int) -> Array:
     return made
 
 
+def reading(means: Readings, k: int) -> Fault:
+    """A single reading that is wrong, in each channel: an angle that was mistyped, rows exchanged, a knock."""
+    columns = np.zeros((*means.y.shape, means.y.shape[1]))
+    columns[k] = np.eye(means.y.shape[1])
+    angles = ", ".join(f"{angle:.6g}" for angle in np.degrees(means.angles[k]))
+    what = f"a departure of position {k + 1} in the order taken (at {angles} deg) from what all others say"
+    return Fault(f"reading {k}", "outlier", columns, what, _of_output, "reading")
+
+
 def _drifts(means: Readings, fit: Regression) -> Iterator[Fault]:
     """Bias and scale factor that change with time, of each channel."""
     s, fitted = fraction(means.times), fit.y - fit.residuals

@@ -21,7 +21,7 @@ SHOWN = 4
 ROUNDING = 1e-9
 """Part of what a fault does to the values below which a direction of it does nothing."""
 
-DRIFTS = frozenset({"trend", "warm-up", "scale drift"})
+DRIFTS = frozenset({"trend", "warm-up", "scale drift", "reading"})
 """Kinds of faults that are others in each run."""
 
 REMEDY: Mapping[str, str] = {
@@ -31,6 +31,7 @@ REMEDY: Mapping[str, str] = {
     "level_suspect": "level the base, or state dbase_x and dbase_y",
     "angle_harmonic": "check the encoder, or state a larger error of this joint",
     "approach_hysteresis": "reach all positions from the same side",
+    "outlier": "look for an angle that was mistyped, rows exchanged or a knock, and take this position out or again",
     "ground_field": "look for magnets and iron, or shield the instrument",
 }
 """Remedy for a finding of each code."""
