@@ -3,6 +3,8 @@
 import pytest
 from wires import HEADER, Cable, Server, by_stream, free_port, rows, until, waiting, wire
 
+from inercal.live.address import source_of
+from inercal.live.intake import Intake
 from inercal.live.measurement import measure
 
 KINDS = ("serial", "udp", "tcp", "mqtts")
@@ -194,3 +196,40 @@ def test_silence_is_said(study, tmp_path, monkeypatch, request):
     assert until(lambda: any("nothing has come for 0.1 s" in alarm.message for alarm in running.alarms))
     assert running.alive
     sound(running)
+
+
+def test_where_there_is_no_room_datagrams_are_dropped_and_counted(monkeypatch, tmp_path, request):
+    monkeypatch.setattr("inercal.live.intake.ROOM", 500)
+    said = []
+    near, address = wire("udp", tmp_path)
+    request.addfinalizer(near.close)
+    intake = Intake(source_of(address), said.append)
+    intake.begin()
+    for _ in range(20):
+        near.send(b"x" * 99 + b"\n")
+    assert until(lambda: intake.received == 2000)
+    assert intake.dropped == 1500
+    assert said == [f"{address}: rows come faster than they are worked on, some are dropped"]
+    assert [intake.next(1.0).joined for _ in range(5)] == [True, False, False, False, False]
+    near.send(b"y\n")
+    after = intake.next(10.0)
+    assert (after.piece.data, after.joined) == (b"y\n", True)  # a begun row must not go on with it
+    intake.end()
+    assert intake.next(0.1) is None
+    assert intake.ended
+
+
+def test_a_connection_waits_where_there_is_no_room(monkeypatch, tmp_path, request):
+    monkeypatch.setattr("inercal.live.intake.ROOM", 70_000)
+    near, address = wire("tcp", tmp_path)
+    request.addfinalizer(near.close)
+    intake = Intake(source_of(address), pytest.fail)
+    intake.begin()
+    near.send(b"z" * 300_000)
+    assert until(lambda: intake.received >= 65_536)
+    got = b""
+    while len(got) < 300_000:
+        got += intake.next(10.0).piece.data
+    assert got == b"z" * 300_000
+    assert (intake.received, intake.dropped) == (300_000, 0)
+    intake.end()

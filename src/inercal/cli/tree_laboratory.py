@@ -90,7 +90,7 @@ LABORATORY = {
         "tried again; what is lost, out of order, late or dropped is counted and said. --record keeps the raw rows, of "
         "which replay: gives the same digits. User and password of a broker are in INERCAL_MQTT_USER and "
         "INERCAL_MQTT_PASSWORD, or in a file named by ?login=FILE. Ctrl-C ends it in order.",
-        "inercal live 'replay:model.csv?speed=0' --study aoa.toml --to text:angles.csv",
+        "inercal live udp://127.0.0.1:5005 --study aoa.toml",
     ),
     ("workbench", ""): (
         "inercal.cli.workbench:workbench",
