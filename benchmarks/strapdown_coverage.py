@@ -6,8 +6,8 @@ Truth is drawn from the prior, runs are those of the program's own simulator, 19
 of 31 coefficients, coverage of 95 % intervals, scatter over bounds (geometric mean, least and largest coefficient),
 chi-square over its degrees of freedom. Of the stated u, with drifts by force that are not fitted: the same coverage,
 and by how much u is larger (geometric mean, worst coefficient). Where biases do not walk the largest difference of
-filter and batch [u]; where they do, also with all noise but the white left to the recording. The results are kept in
-docs/theory/strapdown.md, by hand.
+filter and batch [u]; where they do, also with all noise but the white left to the recording: all figures of that are of
+the stated u, which has what the sizes of noise leave open. The results are kept in docs/theory/strapdown.md, by hand.
 """
 
 import argparse

@@ -60,13 +60,14 @@ class Calibration:
         ]
         made = calibrate(record_of(columns, samples.ts * np.arange(1, len(samples.rate) + 1)), settings)
         of, fit = made.estimate, made.fit
-        off = (fit.c - c)[fit.free]
         u = np.array([of[name].u for name in of.names])
         error = np.array([of[name].value for name in of.names]) - stated(c, true.terms, true.frame)
+        found = settings.noise != true.noise
+        off, covariance = (error, of.covariance) if found else ((fit.c - c)[fit.free], fit.covariance)
         return {
-            "z": (off / np.sqrt(np.diag(fit.covariance))).tolist(),
+            "z": (off / np.sqrt(np.diag(covariance))).tolist(),
             "z_stated": (error / u).tolist(),
-            "nees": float(off @ np.linalg.solve(fit.covariance, off)),
+            "nees": float(off @ np.linalg.solve(covariance, off)),
             "square": float(fit.chi2 / fit.dof),
             "growth": (u / np.array([of.result["bounds"][name] for name in of.names])).tolist(),
             "apart": [apart(of)] if settings.filter == "error-state" else [],
