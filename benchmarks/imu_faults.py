@@ -12,11 +12,12 @@ import argparse
 import functools
 import os
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from campaigns.places import add_options, answers, in_words
 from independent import imu
 
 from inercal.errors import InputError
@@ -117,12 +118,24 @@ def row(name, draws, settings):
     return f"| {name} | {size} | {counts} | {far} | {codes} |"
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Rows of the table by their numbers."""
+
+    draws: int
+
+    def __call__(self, number):
+        """One of them."""
+        return row([*CASES][number], self.draws, ImuSettings(SITE))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument(
         "--sound", type=int, default=0, help="count the verdicts of so many sound recordings only"
     )
+    add_options(parser)
     options = parser.parse_args()
     settings = ImuSettings(SITE)
     if options.sound:
@@ -134,9 +147,12 @@ def main() -> None:
         print(", ".join(f"{word} {count}" for word, count in ended.most_common()))
         return
     print("| fault | shift [u] | verdicts | ok with more than 2 u | names |\n| --- | --- | --- | --- | --- |")
-    for name in CASES:
-        print(row(name, options.draws, settings), flush=True)
+    from imu_faults import Rows  # by this name, which workers know too
+
+    about = {"imu_faults": [*CASES], "draws": options.draws}
+    for line in answers(Rows(options.draws), len(CASES), options, about, 1):
+        print(line)
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -19,12 +19,13 @@ import os
 import tempfile
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from campaigns.places import add_options, answers, in_words
 from independent.selfcal import (
     ARCSEC,
     DEG_H,
@@ -187,6 +188,19 @@ def summary_of(states: str, fault: str, size: int, draws: int) -> dict:
     }
 
 
+@dataclass(frozen=True)
+class Summaries:
+    """The summaries of faults (name, number of its size), by their numbers."""
+
+    states: str
+    draws: int
+    asked: tuple[tuple[str, int], ...]
+
+    def __call__(self, number: int) -> dict:
+        """One of them."""
+        return summary_of(self.states, *self.asked[number], self.draws)
+
+
 HEAD = (
     "| fault | size | shift | ok | worst of those ok | NEES/18 | wider | verdicts | said |\n"
     + "|---" * 9
@@ -212,8 +226,8 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=50)
     parser.add_argument("--states", default="", help="of [model], as in the study; its default if absent")
     parser.add_argument("--only", default="", help="part of fault and size")
-    parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path)
+    add_options(parser)
     given = parser.parse_args()
     asked = [
         (fault, k)
@@ -221,23 +235,18 @@ def main() -> None:
         for k, (words, _) in enumerate(sizes)
         if given.only in f"{fault} {words}"
     ]
-    with ProcessPoolExecutor(given.workers) as pool:
-        waiting = {
-            f"{fault}|{ALL[fault][k][0]}": pool.submit(summary_of, given.states, fault, k, given.draws)
-            for fault, k in asked
-        }
-        results = {}
-        print(HEAD)
-        for (
-            key,
-            each,
-        ) in waiting.items():  # kept and printed as they come: a campaign that is cut off leaves these
-            results[key] = each.result()
-            print(row(key, results[key]), flush=True)
-            if given.out is not None:
-                given.out.parent.mkdir(parents=True, exist_ok=True)
-                given.out.write_text(json.dumps(results, indent=1))
+    from selfcal_faults import Summaries  # by this name, which workers know too
+
+    about = {"selfcal_faults": asked, "states": given.states, "draws": given.draws}
+    found = answers(Summaries(given.states, given.draws, tuple(asked)), len(asked), given, about, 1)
+    results = {f"{fault}|{ALL[fault][k][0]}": each for (fault, k), each in zip(asked, found, strict=True)}
+    print(HEAD)
+    for key, each in results.items():
+        print(row(key, each))
+    if given.out is not None:
+        given.out.parent.mkdir(parents=True, exist_ok=True)
+        given.out.write_text(json.dumps(results, indent=1))
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)

@@ -11,11 +11,12 @@ docs/uncertainty/strapdown-faults.md, by hand.
 import argparse
 import os
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from campaigns.places import add_options, answers, in_words
 from independent import strapdown
 
 from inercal.findings import CODES, Harm, Status
@@ -100,10 +101,22 @@ def row(name, draws, first=0):
     return f"| {name} | {size} | {counts} | {sum(each > 4.0 for each in passed)} | {codes} |"
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Rows of the table by their numbers."""
+
+    draws: int
+
+    def __call__(self, number):
+        """One of them."""
+        return row([*CASES][number], self.draws)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--draws", type=int, default=20)
     parser.add_argument("--sound", type=int, default=0, help="only so many sound recordings")
+    add_options(parser)
     options = parser.parse_args()
     print(
         "| fault | largest error [u] | verdicts | ok with more than 4 u | names |\n| --- | --- | --- | --- | --- |"
@@ -111,9 +124,12 @@ def main() -> None:
     if options.sound:
         print(row("none", options.sound, 1000))
         return
-    for name in CASES:
-        print(row(name, options.draws), flush=True)
+    from strapdown_faults import Rows  # by this name, which workers know too
+
+    about = {"strapdown_faults": [*CASES], "draws": options.draws}
+    for line in answers(Rows(options.draws), len(CASES), options, about, 1):
+        print(line)
 
 
 if __name__ == "__main__":
-    main()
+    in_words(main)
