@@ -229,6 +229,15 @@ def test_a_wrong_file_is_refused_in_a_sentence(tab, tmp_path):
     watched.sound()
 
 
+SHIFT = """() => new Promise(done => {
+    let sum = 0;
+    new PerformanceObserver(list => { for (const each of list.getEntries()) sum += each.value; })
+        .observe({ type: 'layout-shift', buffered: true });
+    setTimeout(() => done(sum), 300);
+})"""
+"""How much of a page has moved since it was opened, by the browser's own measure."""
+
+
 def test_a_run_goes_on_over_reloads_and_in_two_tabs(tab, bench):
     _, session = bench.ask("/api/v1/sessions", {"example": "ferraris-si"})
     number = session["session"]
@@ -242,6 +251,8 @@ def test_a_run_goes_on_over_reloads_and_in_two_tabs(tab, bench):
     for each in (page, other):
         each.wait_for_url("**/result", timeout=120_000)
         each.wait_for_selector('[data-verdict]:has-text("ok")')
+    page.frame_locator("iframe.report").locator("h2").first.wait_for()
+    assert page.evaluate(SHIFT) < 0.05  # a button stays where it is while the report is loading
     jobs = [job for job in bench.ask("/api/v1/jobs")[1] if job["session"] == number]
     assert [job["state"] for job in jobs] == ["done"]
     other.close()

@@ -182,6 +182,7 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     job = await run(bench, session)
     found = json.loads(job.result.read_text())
     found["findings"][0]["message"] += ": set imu.k2 = true"
+    found["status"]["message"] += "; or take `inercal calibrate strapdown`"
     job.result.write_text(json.dumps(found))
     await user.open(f"/sessions/{session.id}/result")
     await user.should_see("ok: 33 coefficients")
@@ -194,3 +195,8 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     assert "k2 = true" in session.study.read_text()
     await user.open(f"/sessions/{session.id}/result")
     await user.should_not_see("Set imu.k2 = true")
+    user.find("Begin again with inercal calibrate strapdown").click()
+    await user.should_see("The study as text", retries=20)
+    (newest, *_) = bench.sessions
+    assert (newest.kind, newest.recordings[0].name) == ("strapdown", session.recordings[0].name)
+    assert newest.map.read_text() == session.map.read_text()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from inercal.examples import FOLDER
 from inercal.findings import Finding
 from inercal.inputs import Source
 from inercal.records.column import Column
@@ -69,12 +70,22 @@ STUDY = '[imu]\nmethod = "multiposition"\n\n[model]\nstates = ["paper", "gamma"]
         ('take states = "extended" under [model]', ['model.states = "extended"']),
         ("name delay in states under [model], or", ['model.states = ["paper", "gamma", "delay"]']),
         ("name gamma in states under [model]", []),
+        ("kg1, delay are no states; name them in states under [model]", []),
         ('set imu.method = "multiposition"', []),
         ("state heading under [rig]; check the azimuth", []),
     ],
 )
 def test_advice_is_a_change_that_the_study_does_not_have(words, changes):
-    assert [each.words for each in advice_of(Finding("outlier", words), STUDY)] == changes
+    assert [each.words for each in advice_of(Finding("outlier", words), STUDY, "imu")] == changes
+
+
+def test_advice_that_would_spoil_a_good_study_is_none():
+    study = (FOLDER / "selfcal.toml").read_text()
+    for words, changes in (
+        ("name gamma in states under [model]", ['model.states = ["paper", "gamma"]']),
+        ("name warmth in states under [model]", []),
+    ):
+        assert [each.words for each in advice_of(Finding("outlier", words), study, "selfcal")] == changes
 
 
 def record(t, **channels):
@@ -97,6 +108,11 @@ def test_rests_are_those_in_which_nothing_moves():
         assert abs(end - 20.0 * k - 14.0) < 1.2
     assert quiet(record(t, acc_x=rng.normal(size=len(t)))) == ()
     assert quiet(record(t[:50], acc_x=values[:50])) == ()
+    turned = (
+        np.where(t < 60.0, t, 60.0) // 0.01 * 0.01
+    )  # about the vertical until 60 s: accelerometers see nothing
+    found = quiet(record(t, acc_x=values, th_z=turned + 0.01 * rng.integers(0, 2, size=len(t))))
+    assert [round(begin / 20.0) for begin, _ in found] == [3, 4, 5]
     positions = np.repeat([1.0, 2.0, 3.0], 4000)
     found = quiet(record(t, position=positions, acc_x=values))
     np.testing.assert_allclose(found, [[0.0, 39.99], [40.0, 79.99], [80.0, 119.99]])

@@ -20,8 +20,8 @@ _FEWEST = 20
 
 
 def quiet(record: Record) -> tuple[tuple[float, float], ...]:
-    """Stretches (begin, end) [s] of one position of a table; without positions those in which all accelerometers and
-    gyros are about as calm as they ever are.
+    """Stretches (begin, end) [s] of one position of a table; without positions those in which all accelerometers, gyros
+    and angles of joints are about as calm as they ever are.
 
     Told by the variance in windows of about a second one after the other, which also are how well the ends are known;
     none for a recording of a few windows, without times, or about as lively throughout.
@@ -30,12 +30,13 @@ def quiet(record: Record) -> tuple[tuple[float, float], ...]:
         return _positions(record.columns["position"])
     sensed = [each for each in record.columns.values() if each.sensor in ("acc", "gyro")]
     sensed += [each for each in record.columns.values() if each.name[0] == "a" and each.name[1:].isdigit()]
+    joints = [each for each in record.columns.values() if each.sensor in ("th", "phi1", "phi2", "phi3")]
     if not sensed or counted_rows(record.columns):
         return ()
     t = sensed[0].t
     size = window_samples((len(t) - 1) / float(t[-1] - t[0])) if len(t) > 1 and t[-1] > t[0] else len(t) + 1
     count = len(t) // size
-    if count < _FEWEST or any(each.t is not t and len(each.t) != len(t) for each in sensed):
+    if count < _FEWEST or any(each.t is not t and len(each.t) != len(t) for each in (*sensed, *joints)):
         return ()
     still = np.ones(count, dtype=bool)
     lively = False
@@ -49,11 +50,22 @@ def quiet(record: Record) -> tuple[tuple[float, float], ...]:
         still &= variance <= _CALM * max(float(calm), np.finfo(float).tiny)
     if not lively:
         return ()
+    for each in joints:  # at a steady rate about the vertical no sensor changes
+        variance = _variances(each, size, count)
+        known = variance[np.isfinite(variance)]
+        calm = float(np.quantile(known, 0.05)) if len(known) else 0.0
+        still &= variance <= max(_CALM * calm, 0.25 * _smallest_step(each) ** 2)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     return tuple(
         (float(t[begin * size]), float(t[min(end * size, len(t)) - 1]))
         for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     )
+
+
+def _smallest_step(column: Column) -> float:
+    """The least change from row to row that is none of zero: a count of an encoder, which may flicker."""
+    steps = np.abs(np.diff(column.values))
+    return float(np.min(steps, initial=np.inf, where=steps > 0.0)) if (steps > 0.0).any() else 0.0
 
 
 def _positions(column: Column) -> tuple[tuple[float, float], ...]:

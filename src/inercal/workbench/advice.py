@@ -8,13 +8,13 @@ from typing import Any
 
 from inercal.errors import InputError
 from inercal.findings import Finding
-from inercal.workbench.form import changed, parsed
+from inercal.workbench.form import changed, parsed, problem
 
 _SET = re.compile(r"\bset ([a-z_]\w*(?:\.\w+)+) = (true|false|\"[^\"]*\"|[-+.\de]+\d)")
 _UNDER = re.compile(
     r"\b(?:write|state|take) (\w+) = (\"[^\"]*\"|true|false|[-+.\de]*\d)[^;\[]{0,60}? under \[([\w.]+)\]"
 )
-_STATES = re.compile(r"\bname ([\w, ]+?) in states under \[model\]")
+_STATES = re.compile(r"\bname (?!them\b)([\w, ]+?) in states under \[model\]")
 """The words in which findings say what to write: a key and its value, or kinds of states of a platform."""
 
 
@@ -31,14 +31,15 @@ class Advice:
         return f"{self.path} = {self.value}"
 
 
-def advice_of(finding: Finding, study: str) -> tuple[Advice, ...]:
-    """Changes of the text of a study that a finding advises, without those that it has already."""
+def advice_of(finding: Finding, study: str, kind: str) -> tuple[Advice, ...]:
+    """Changes of the text of a study of that kind that a finding advises, without those that it has already, and
+    without those that would make a good study one that cannot be used."""
     found = [Advice(match[1], match[2]) for match in _SET.finditer(finding.message)]
     found += [Advice(f"{match[3]}.{match[1]}", match[2]) for match in _UNDER.finditer(finding.message)]
     for match in _STATES.finditer(finding.message):
         kinds = [kind for kind in re.split(r", | or | and ", match[1]) if re.fullmatch(r"\w+", kind)]
         found += [each for each in [_with_states(kinds[:1], study)] if each is not None]
-    return tuple(dict.fromkeys(each for each in found if _changes(each, study)))
+    return tuple(dict.fromkeys(each for each in found if _changes(each, study, kind)))
 
 
 def _with_states(kinds: list[str], study: str) -> Advice | None:
@@ -53,9 +54,11 @@ def _with_states(kinds: list[str], study: str) -> Advice | None:
     return Advice("model.states", str([*listed, *added]).replace("'", '"')) if added else None
 
 
-def _changes(advice: Advice, study: str) -> bool:
+def _changes(advice: Advice, study: str, kind: str) -> bool:
     """True for a change that can be made, and is one."""
     try:
-        return parsed(changed(study, advice.path, advice.value)) != parsed(study)
+        made = changed(study, advice.path, advice.value)
+        differs = parsed(made) != parsed(study)
     except InputError:
         return False
+    return differs and (not problem(kind, made) or bool(problem(kind, study)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import threading
 from collections import OrderedDict
@@ -125,6 +126,18 @@ class Bench:
             raise InputError("kind", f"found {kind!r}, expected one of {', '.join(PLANNED)}")
         session = self.sessions.begin(f"plan of a test: {KINDS[kind]}")
         return self.begin_study(session, kind)
+
+    def again_as(self, session: Session, kind: str) -> Session:
+        """A new session with recordings and map of another, and a study of that kind; raises `InputError`."""
+        made = self.sessions.begin(f"{session.title}, as {KINDS[kind]}")
+        for path in (*session.recordings, *filter(None, [session.map])):
+            try:
+                os.link(
+                    path, made.folder / path.name
+                )  # what comes later takes its place, in one of them alone
+            except OSError:
+                shutil.copyfile(path, made.folder / path.name)
+        return self.begin_study(made, kind)
 
     def foreseen(self, session: Session) -> tuple[Study, Foresight, Planned]:
         """The study of a session, what its plan makes expect, and its course; raises `InputError`."""

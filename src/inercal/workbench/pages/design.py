@@ -23,6 +23,7 @@ from inercal.workbench.pages.frame import (
     command,
     framed,
     heading,
+    picture,
     refused,
     report,
     table,
@@ -175,7 +176,7 @@ class Desk:
         with self.scenes:
             for words, scene in drawn.items():
                 with ui.element("div"):
-                    plot = ui.plotly(scene.figure).classes("w-full").props(f'aria-label="{words}" role="img"')
+                    plot = picture(scene.figure, words)
                     ui.label(words).classes("quiet text-sm")
                 places[plot.html_id] = scene
         ui.run_javascript(f"inercalMotion({json.dumps(motion(course, places))})")

@@ -69,6 +69,9 @@ def add(bench: Bench) -> None:
             command(job.command)
 
 
+_BY_TURNS = "inercal calibrate strapdown"
+"""The other method, which a verdict may advise."""
+
 _COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
 
 
@@ -77,10 +80,12 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
     ui.label(f"{result.status.value}: {result.message}").classes(
         "verdict " + _COLOURS.get(result.status, "bad")
     ).props('data-verdict="1"')
+    if session.kind == "imu" and _BY_TURNS in result.message:
+        button(f"Begin again with {_BY_TURNS}", partial(_begin_again, bench, session))
     if not result.findings:
         return
     study = "" if session.study is None else read_bytes(session.study).decode(errors="replace")
-    advised = {finding: advice_of(finding, study) for finding in result.findings}
+    advised = {finding: advice_of(finding, study, session.kind) for finding in result.findings}
     shown = result.status is not Status.OK or any(advised.values())
     with ui.expansion(counted(len(result.findings), "finding"), value=shown).classes("w-full"):
         for finding, advice in advised.items():
@@ -88,6 +93,13 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
             ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
             for each in advice:
                 button(f"Set {each.words}", partial(_take, bench, session, each))
+
+
+def _begin_again(bench: Bench, session: Session) -> None:
+    """Begin a session by the other method, and open its study."""
+    with told():
+        made = bench.again_as(session, "strapdown")
+        ui.navigate.to(f"/sessions/{made.id}/study")
 
 
 def _take(bench: Bench, session: Session, advice: Advice) -> None:
@@ -204,7 +216,8 @@ def _compared(bench: Bench, job: Job) -> None:
 def _kept(bench: Bench, job: Job) -> None:
     """Keep the result in the store of the laboratory."""
     heading("Keep it")
-    name = ui.input("Instrument: maker, model, serial (if the study does not say)").classes("w-96 max-w-full")
+    name = ui.input("Instrument: maker, model, serial").classes("w-96 max-w-full")
+    ui.label("Where the study names the instrument under [item], leave it empty.").classes("quiet text-sm")
 
     async def keep() -> None:
         with told():

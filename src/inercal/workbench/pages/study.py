@@ -112,9 +112,9 @@ class Editor:
             except InercalError as error:
                 refused(error)
                 return
-            for each in found:
-                given = bool(data) and any(key.value for key in each.keys)
-                self.table(each, given)
+            given = {each.name: bool(data) and any(key.value for key in each.keys) for each in found}
+            for each in sorted(found, key=lambda each: not given[each.name]):
+                self.table(each, given[each.name])
 
     def table(self, table: Table, given: bool) -> None:
         """One table: the keys it has, then those it may have."""
