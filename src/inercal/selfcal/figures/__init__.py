@@ -141,7 +141,7 @@ def convergence(calibration: Calibration) -> list[Picture]:
         converging(
             "Convergence of the coefficients",
             "Estimates as the platform turns, with bands of ± two standard uncertainties; above each its last value "
-            "with its standard uncertainty u. Bar at the start: the prior, ± two standard deviations about 0."
+            "with its u by noise and prior. Bar at the start: the prior, ± two standard deviations about 0."
             f"{dotted} Each panel spans what the last 45 % of the time leave open: bands and bars may go beyond."
             f"{form}",
             t,

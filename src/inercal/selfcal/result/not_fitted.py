@@ -158,7 +158,7 @@ def _of_names(
 
 
 def _words(kind: str, found: _Effects, own: Array, left: Array) -> str:
-    """How much of a kind is left, in words."""
+    """The largest error that is left of a kind, in words."""
     worst = int(np.flatnonzero(own)[np.argmax(left[own])])
     name = found.names[worst]
     if kind in BIAS_WALK:
