@@ -120,6 +120,7 @@ CODES: dict[str, Code] = {
     "goal_missed": Code("a coefficient is less well known than wanted", _NEVER),
     "flexure": Code("the support of the model shakes its sensors", _BY_SIZE),
     "wide_flexure": Code("the support shakes the model beyond its usual flexure, which u allows for", _NEVER),
+    "wide_gyro_scale": Code("a gyro's scale is beyond its usual prior, which u allows for", _NEVER),
     "band_limited": Code("vibration is taken out of the sensors, motion above the band with it", _NEVER),
     "beyond_limits": Code("an angle is beyond the limits that the study states", _NEVER),
     "rectification": Code("vibration makes an offset of the accelerometers", _BY_SIZE),

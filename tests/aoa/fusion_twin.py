@@ -141,9 +141,9 @@ def _off(x, k):
     return off
 
 
-def above_noise(x, P, j):
-    """Share of a state beyond three standard deviations."""
-    return max(0.0, 1.0 - 9.0 * P[j, j] / x[j] ** 2) if x[j] else 0.0
+def above_noise(x, P, j, largest=math.inf):
+    """Share of a state beyond three standard deviations, of a variance that is the largest at most."""
+    return max(0.0, 1.0 - 9.0 * min(P[j, j], largest) / x[j] ** 2) if x[j] else 0.0
 
 
 def motion_of(x, P):
@@ -153,8 +153,8 @@ def motion_of(x, P):
 
 def believed_of(twin, x, P):
     """(n,) how much of a derivative by each state is kept: of positions, gyro scale and delay as much as moves at a
-    state."""
-    rate, acceleration = (above_noise(x, P, j) for j in (1, 2))
+    state. The noise of a rate is that of the gyro at most, however little is known before the first row."""
+    rate, acceleration = above_noise(x, P, 1, twin.settings.noise.gyro**2), above_noise(x, P, 2)
     by = {"dr": max(rate, acceleration), "zo": max(rate, acceleration), "k": rate, "tau": acceleration}
     return np.array([by.get(name.partition("_")[0], 1.0) for name in twin.names])
 

@@ -8,7 +8,7 @@ from independent.aoa import DEG, Tunnel, simulate
 from sting_study import study
 
 from inercal.aoa.band import Band
-from inercal.aoa.diagnosis.choice import of_delay
+from inercal.aoa.diagnosis.choice import of_delay, of_vibration
 from inercal.aoa.fusion import band
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
@@ -116,3 +116,13 @@ def test_on_a_calm_rig_a_stated_band_costs_little_and_u_says_it(smoothed):
     error, u = np.concatenate(errors).T
     assert np.sqrt(np.mean(error**2)) < 0.03 * DEG
     assert 0.2 < np.sqrt(np.mean(np.square(error / u))) < 1.4
+
+
+def test_what_the_rate_has_no_room_for_is_said():
+    """230 Hz at 500 rows a second is below half of it and is taken out; 300 Hz would be another line."""
+    assert len(Band(np.inf, (230.0,), 500.0).sections) == 1
+    assert Band(np.inf, (230.0,), 500.0).left_out == ()
+    stated = study(band=Band(250.0, (230.0, 300.0), 500.0))
+    (told,) = of_vibration(stated, stated)
+    assert told.code == "band_limited"
+    assert told.message.startswith("250 Hz, 300 Hz under [band] is left out")

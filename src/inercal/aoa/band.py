@@ -39,7 +39,7 @@ class Band:
         A Butterworth low pass, of the filters of its order the one that is flattest over a slow motion; notches.
         """
         low = [_butterworth(self.corner / self.rate)] if self.corner < np.inf else []
-        there = (each for each in self.notch if each < LIMITS.widest_corner * self.rate)
+        there = (each for each in self.notch if each < 0.5 * self.rate)
         return np.vstack([np.empty((0, 6)), *low, *(_notch(each / self.rate) for each in there)])
 
     @property
@@ -48,6 +48,13 @@ class Band:
         if not self.corner < np.inf:
             return 1
         return max(1, round(self.rate / (LIMITS.fused_rate_ratio * self.corner)))
+
+    @property
+    def left_out(self) -> tuple[float, ...]:
+        """Frequencies [Hz] of a low pass and of notches that the rate of rows has no room for."""
+        low, widest = self.low_pass, LIMITS.widest_corner * self.rate
+        corners = () if low is None or low == np.inf or low < widest else (low,)
+        return (*corners, *(each for each in self.notch if not each < 0.5 * self.rate))
 
     @property
     def words(self) -> str:

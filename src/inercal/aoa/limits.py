@@ -211,7 +211,7 @@ class Limits:
     """Frequency of a notch over its width."""
 
     widest_corner: float = 0.4
-    """Corner of a low pass, or notch, over the rate of rows, from which on it is left out."""
+    """Corner of a low pass over the rate of rows, from which on it is left out."""
 
     fused_rate_ratio: float = 2.6
     """Rate of the rows that are fused, over the corner of the low pass: noise of more is alike from row to row."""
@@ -368,6 +368,9 @@ class Limits:
 
     unseen_scale: float = 0.01
     """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
+
+    other_scale_sigmas: float = 2.0
+    """Standard deviations by which a gyro's scale contradicts the usual prior, so that a wider one is taken."""
 
     unseen_drift: float = 1e-3 * STANDARD_GRAVITY
     """Drift [m/s^2] of an accelerometer's bias over a stretch that is tried: of a sensor that warms up."""

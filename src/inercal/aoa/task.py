@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from inercal.aoa.angles import Angles
-from inercal.aoa.diagnosis.choice import decided_with, of_delay, of_rectification, of_vibration
+from inercal.aoa.diagnosis.choice import decided_with, of_delay, of_vibration
 from inercal.aoa.diagnosis.effect import of_flexure
 from inercal.aoa.diagnosis.examination import diagnose, implausible
+from inercal.aoa.diagnosis.rectification import of_rectification
 from inercal.aoa.diagnosis.unseen import unseen
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case

@@ -65,28 +65,31 @@ def kept(state: AoaState, row: Array) -> AoaState:
 
 def choice_of(settings: AoaSettings, final: bool) -> Array:
     """All that was decided, as numbers of a state: 1 where ``final``, 0 for the rate alone; rate, low pass, snap (0 for
-    the usual one), delay and the prior of its rest, flexure in both directions, rectified vibration, notches."""
+    the usual one), delay and the priors of its rest and of the gyro's scale, flexure in both directions, rectified
+    vibration, notches."""
     band, snap = settings.band, settings.estimator.snap or 0.0
     low = math.nan if band.low_pass is None else band.low_pass
-    delay = settings.timing.gyro_delay_about, settings.prior.gyro_delay
+    gyro = settings.timing.gyro_delay_about, settings.prior.gyro_delay, settings.prior.gyro_scale
     shaken = [
         float(each)
         for of in (settings.prior.heave, settings.prior.axial)
         for each in (of.frequency, of.damping, of.level, of.vertical)
     ]
     rectified = settings.prior.rectified
-    return np.array([float(final), band.rate, low, snap, *delay, *shaken, rectified, *band.notch])
+    return np.array([float(final), band.rate, low, snap, *gyro, *shaken, rectified, *band.notch])
 
 
 def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
     """The study with what was decided."""
-    _, rate, low, snap, about, rest, *numbers = choice.tolist()
+    _, rate, low, snap, about, rest, scale, *numbers = choice.tolist()
     heave, axial = (
         Resonance(frequency, damping, level, bool(vertical))
         for frequency, damping, level, vertical in (numbers[:4], numbers[4:8])
     )
     rectified, *notch = numbers[8:]
-    prior = replace(settings.prior, gyro_delay=rest, rectified=rectified, heave=heave, axial=axial)
+    prior = replace(
+        settings.prior, gyro_delay=rest, gyro_scale=scale, rectified=rectified, heave=heave, axial=axial
+    )
     return replace(
         settings,
         band=Band(None if math.isnan(low) else low, tuple(notch), rate),

@@ -3,7 +3,8 @@
 The delay is that of the spectra, and the filter may learn what is left of it. Band and snap are judged by the
 innovations: taken is the widest band, and in it the smallest density of snap, under which innovations are nearly as
 small as those of a still model with the study's noise, and a livelier model would not fit better than it does there.
-So calm recordings keep all of their band and the usual snap. Lines come out before a larger snap is tried.
+So calm recordings keep all of their band and the usual snap. Lines come out before a larger snap is tried. A gyro's
+scale that contradicts its usual prior has a wider one.
 Under too small a snap a buffet is taken for errors of positions and scale; under too large a one noise is taken for
 motion, and these errors are learned from it. Vibration that is no rotation fits under no snap: lines and what lies
 above the model's motion are taken out of all sensors alike.
@@ -18,11 +19,13 @@ from functools import cache
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.aoa.band import Band
+from inercal.aoa.diagnosis import gyro_scale
 from inercal.aoa.diagnosis.noise_check import misstated
-from inercal.aoa.diagnosis.spectrum import highest_motion, lines, powers, white_noise
+from inercal.aoa.diagnosis.rectification import with_offsets
+from inercal.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
+from inercal.aoa.diagnosis.stretches import liveliest, part_of
 from inercal.aoa.fusion import band as limiting
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.loop import OUTPUTS
@@ -30,10 +33,10 @@ from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import advance, initial
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.delay import Delay, relative_delay
-from inercal.aoa.reading.clock import in_time, later
+from inercal.aoa.reading.clock import in_time
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior, Resonance
-from inercal.arrays import Array, remembered
+from inercal.arrays import Array
 from inercal.findings import EVERYTHING, Finding
 from inercal.units import STANDARD_GRAVITY
 
@@ -63,11 +66,11 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     stated = settings.band.low_pass is not None
     if stated and settings.estimator.snap is not None:
         return settings
-    settings = _with_delay(delay, _with_offsets(recording, settings))
+    settings = _with_delay(delay, with_offsets(recording, settings))
     densities = _densities(settings)
     settings = _with_snap(settings, densities[0])
     plain = settings if stated else replace(settings, band=replace(settings.band, low_pass=math.inf))
-    stretches = [_part(recording, rows) for rows in _liveliest(recording)]
+    stretches = [part_of(recording, rows) for rows in liveliest(recording)]
     if not stretches:
         return plain
     fair = _fair(stretches[0], settings)
@@ -83,7 +86,8 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
                 fitting = _with_snap(replace(settings, band=band, prior=prior), density)
                 # under the liveliest model nothing is left to tell flexure by
                 lively = density == DENSITIES[-1]
-                return fitting if lively else _calmer(stretches, settings.prior, fitting)
+                fitting = fitting if lively else _calmer(stretches, settings.prior, fitting)
+                return gyro_scale.of_recording(stretches, fitting)
     return plain
 
 
@@ -198,13 +202,19 @@ def _shaken(prior: Prior) -> Iterator[Prior]:
 
 
 def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
-    """``band_limited`` and ``wide_flexure``: a band, and flexure of the sting, that the recording decided, and what to
-    write to keep them."""
+    """``band_limited``, ``wide_flexure``, ``wide_gyro_scale``: a band, flexure of the sting and a prior of the gyro's
+    scale that the recording decided, and what to write to keep them."""
     findings, band, flexure = [], decided.band, decided.prior.heave
     if settings.band.low_pass is None and len(band.sections) > len(settings.band.notch):
         text = (
             "the sensors feel vibration that is no motion of the model, and the fusion takes what is left of them "
             f"without it: to have the same band again write {band.words} under [band]"
+        )
+        findings.append(Finding("band_limited", text))
+    if left := band.left_out:
+        text = (
+            f"{', '.join(f'{each:.4g} Hz' for each in left)} under [band] is left out: of {band.rate:.4g} rows a "
+            f"second a low pass is to be below {LIMITS.widest_corner:g}, a notch below half"
         )
         findings.append(Finding("band_limited", text))
     if flexure.frequency != settings.prior.heave.frequency:
@@ -219,46 +229,14 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
             )
         )
         findings.append(Finding("wide_flexure", text))
+    if decided.prior.gyro_scale != settings.prior.gyro_scale:
+        text = (
+            f"the recording contradicts a gyro whose scale is known to {100.0 * settings.prior.gyro_scale:g} %, and u "
+            f'allows for {100.0 * decided.prior.gyro_scale:g} %: calibrate it, or write gyro_scale = "'
+            f'{100.0 * decided.prior.gyro_scale:g} %" under [prior]'
+        )
+        findings.append(Finding("wide_gyro_scale", text))
     return findings
-
-
-def of_rectification(recording: Recording, settings: AoaSettings, u: float) -> list[Finding]:
-    """``rectification``: vibration that by a common K2 makes an offset of the angle near its ``u`` [rad], without being
-    in it."""
-    stated, power = settings.noise.rectification, _vibration(recording)
-    k2 = stated or LIMITS.common_k2
-    off = k2 * power / STANDARD_GRAVITY
-    if settings.prior.rectified or not off > LIMITS.told_offset * u:
-        return []
-    advice = (
-        "band and snap are stated, so u has none of it"
-        if stated
-        else "write rectification under [noise], so that u has it"
-    )
-    text = (
-        f"accelerometers feel {math.sqrt(power) / STANDARD_GRAVITY:.2g} g rms above {LIMITS.lowest_line:g} Hz: a K2 of "
-        f"{1e6 * k2 * STANDARD_GRAVITY:.3g} ug/g^2 makes an offset of {math.degrees(off):.2g} deg of it; {advice}"
-    )
-    return [Finding("rectification", text, harm=EVERYTHING if off > u else ())]
-
-
-def _with_offsets(recording: Recording, settings: AoaSettings) -> AoaSettings:
-    """The study with what vibration may make of the stated K2, which lies anywhere up to it."""
-    k2 = settings.noise.rectification
-    if not k2:
-        return settings
-    offset = k2 * _vibration(recording) / math.sqrt(3.0)
-    return replace(settings, prior=replace(settings.prior, rectified=offset))
-
-
-def _vibration(recording: Recording) -> float:
-    """Mean square [m^2/s^4] above `Limits.lowest_line` in the liveliest stretch, of the accelerometer that feels most;
-    0 of a short recording."""
-    rows = next(iter(_liveliest(recording)), None)
-    if rows is None:
-        return 0.0
-    frequency, density = powers(recording.t[rows], recording.acc[rows])
-    return float(density[frequency > LIMITS.lowest_line].sum(axis=0).max() * frequency[1])
 
 
 def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
@@ -335,39 +313,6 @@ def _bands(part: Recording, settings: AoaSettings) -> Iterator[Band]:
         band = Band(corner, tuple(dict.fromkeys([*stated, *found])), rate)
         if len(band.sections) > len(stated):
             yield band
-
-
-@remembered
-def _liveliest(recording: Recording) -> tuple[NDArray[np.int64], ...]:
-    """Rows of the stretches in which readings differ most from one row to the next, the liveliest first."""
-    taken, t = later(recording.t), recording.t[in_time(recording.t)]
-    number = np.floor((t - t[:1]) / LIMITS.snap_time)
-    stretches = [
-        rows for rows in np.split(taken, np.flatnonzero(np.diff(number)) + 1) if _enough(recording, rows)
-    ]
-    sizes = [_restless(recording, rows) for rows in stretches]
-    return tuple(stretches[k].copy() for k in np.argsort(sizes)[::-1][: LIMITS.snap_stretches])
-
-
-def _enough(recording: Recording, rows: NDArray[np.int64]) -> bool:
-    """True for a stretch that goes on for twice the time in which a filter settles, in rows near enough for spectra."""
-    t = recording.t[rows]
-    if len(rows) < 4 or not np.ptp(t) > 2.0 * LIMITS.settling_time:
-        return False
-    return bool(4.0 * np.median(np.diff(t)) <= LIMITS.line_segment)
-
-
-def _restless(recording: Recording, rows: NDArray[np.int64]) -> float:
-    """Root mean square of the second differences of all readings of a stretch, without single wild ones."""
-    second = np.abs(np.diff(np.column_stack([recording.acc[rows], recording.gyro[rows]]), 2, axis=0))
-    finite = second[np.isfinite(second)]
-    return float(np.sqrt(np.mean(np.minimum(finite, np.quantile(finite, 0.99)) ** 2))) if finite.size else 0.0
-
-
-def _part(recording: Recording, rows: NDArray[np.int64]) -> Recording:
-    """A stretch of a recording."""
-    columns = {name: getattr(recording, name)[rows] for name in ("t", "acc", "gyro", "turns", "zero_angle")}
-    return replace(recording, **columns, point=None, trigger=None, reference=None, masked=None)
 
 
 def _nis(of: FilterProblem, part: Recording) -> float:

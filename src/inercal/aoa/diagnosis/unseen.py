@@ -14,6 +14,7 @@ import numpy as np
 
 from inercal.aoa.diagnosis.effect import Effect, effect
 from inercal.aoa.diagnosis.fit_quality import stretch
+from inercal.aoa.diagnosis.gyro_scale import Scale, alone, of_prior
 from inercal.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.limits import LIMITS
@@ -23,11 +24,15 @@ from inercal.units import STANDARD_GRAVITY
 
 
 def unseen(recording: Recording, problem: FilterProblem) -> list[Finding]:
-    """``weak_test``: what would shift the angle by over twice u, unnoticed: a gyro's scale that is off by
-    `Limits.unseen_scale`, and a bias that drifts by `Limits.unseen_drift` where no random walk is stated."""
+    """``prior_suspect`` where the gyro's scale contradicts its prior; else ``weak_test``: what would shift the angle by
+    over twice u, unnoticed: a gyro's scale that is off by `Limits.unseen_scale`, or as far as the recording does not
+    contradict it, and a bias that drifts by `Limits.unseen_drift` where no random walk is stated."""
     part = stretch(recording)
+    own = alone(part, problem)
+    if wrong := of_prior(part, problem, own):
+        return wrong
     plain = estimate(part, problem)
-    return [*_scale(part, problem, plain), *_drift(part, problem, plain)]
+    return [*_scale(part, problem, plain, own), *_drift(part, problem, plain)]
 
 
 def _told(part: Recording, off: Recording, problem: FilterProblem, plain: FilterResult) -> Effect | None:
@@ -38,15 +43,19 @@ def _told(part: Recording, off: Recording, problem: FilterProblem, plain: Filter
     return found
 
 
-def _scale(part: Recording, problem: FilterProblem, plain: FilterResult) -> list[Finding]:
+def _scale(part: Recording, problem: FilterProblem, plain: FilterResult, own: Scale | None) -> list[Finding]:
     """The gyro's scale."""
-    off = replace(part, gyro=(1.0 + LIMITS.unseen_scale) * part.gyro)
-    if not np.isfinite(part.gyro).any() or (found := _told(part, off, problem, plain)) is None:
+    if not np.isfinite(part.gyro).any():
+        return []
+    hidden = math.inf if own is None else LIMITS.prior_sigmas * own.apart
+    size = min(LIMITS.unseen_scale, hidden)
+    off = replace(part, gyro=(1.0 + size) * part.gyro)
+    if (found := _told(part, off, problem, plain)) is None:
         return []
     text = (
-        f"nothing in this motion would show a gyro whose scale is off by {100.0 * LIMITS.unseen_scale:g} %, which "
-        f"shifts the angle by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u: verify it, or state a "
-        "wider gyro_scale under [prior]"
+        f"nothing in this motion would show a gyro whose scale is off by {100.0 * size:.2g} %, which shifts the angle "
+        f"by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u: verify it, or state a wider gyro_scale "
+        "under [prior]"
     )
     return [Finding("weak_test", text)]
 

@@ -338,7 +338,8 @@ def _advance(
             transition(dt, model, F, Q)
             last, snap = dt, Q[0, 0]
         rate, acceleration, jerk = x[1], x[2], x[3] * significant(x[3], P[3, 3])
-        of_rate, of_acceleration = significant(rate, P[1, 1]), significant(acceleration, P[2, 2])
+        of_rate = significant(rate, min(P[1, 1], constants.gyro_noise))  # P of a start is no noise
+        of_acceleration = significant(acceleration, P[2, 2])
         if dt > 0.0:
             go_on(belief, Step(dt, p, y, snap), model, F, Q, work)
         if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):

@@ -1,0 +1,93 @@
+"""The gyro's scale by a recording alone, beside what its prior allows.
+
+Under a prior that is ten times as wide the fusion tells what the recording itself says: 1 / P less the information of
+that prior. Where this contradicts the usual prior, the gyro is no such gyro, and a wider one is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.aoa.diagnosis.effect import effect
+from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.problem import FilterProblem, problem
+from inercal.aoa.limits import LIMITS
+from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings, Prior
+from inercal.findings import EVERYTHING, Finding
+
+_WIDER = 10.0
+"""Times the prior's standard deviation under which a recording speaks for itself."""
+
+
+class Scale(NamedTuple):
+    """Error of the gyro's scale [1] by a recording alone, with its standard uncertainty; what it is off by from the
+    prior, and the standard deviation of that."""
+
+    value: float
+    u: float
+    off: float
+    apart: float
+
+    @property
+    def sigmas(self) -> float:
+        """Distance from the prior in standard deviations."""
+        return abs(self.off) / self.apart
+
+
+def alone(part: Recording, of: FilterProblem) -> Scale | None:
+    """The scale that a stretch shows by itself; None where it shows none."""
+    k = of.places.scale
+    if k < 0 or not of.covariance[k, k] > 0.0 or not np.isfinite(part.gyro).any():
+        return None
+    prior, mean = float(of.covariance[k, k]), float(of.mean[k])
+    state = estimate(part, _wider(of)).state
+    variance, wide = float(state.P[k, k]), _WIDER**2 * prior
+    if not 0.0 < variance < wide:
+        return None
+    own = 1.0 / (1.0 / variance - 1.0 / wide)
+    value = own * (float(state.x[k]) / variance - mean / wide)
+    return Scale(value, math.sqrt(own), value - mean, math.sqrt(prior + own))
+
+
+def _wider(of: FilterProblem) -> FilterProblem:
+    """The problem with a wider prior of the scale."""
+    k, covariance = of.places.scale, of.covariance.copy()
+    variance = _WIDER**2 * covariance[k, k]
+    covariance[k], covariance[:, k] = 0.0, 0.0
+    covariance[k, k] = variance
+    return replace(of, covariance=covariance)
+
+
+def of_recording(stretches: Sequence[Recording], settings: AoaSettings) -> AoaSettings:
+    """The study with a prior of `Limits.unseen_scale` where a stretch contradicts the usual one, and the study states
+    none."""
+    if settings.prior.gyro_scale != Prior().gyro_scale or settings.estimator.prior is not None:
+        return settings
+    for part in stretches:
+        found = alone(part, problem(settings, part.spatial))
+        if found is not None and found.sigmas > LIMITS.other_scale_sigmas:
+            return replace(settings, prior=replace(settings.prior, gyro_scale=LIMITS.unseen_scale))
+    return settings
+
+
+def of_prior(part: Recording, of: FilterProblem, found: Scale | None) -> list[Finding]:
+    """``prior_suspect``: the scale that a stretch shows contradicts the prior, and the angle would be another one."""
+    if found is None or not found.sigmas > LIMITS.prior_sigmas:
+        return []
+    cost = effect(estimate(part, of), estimate(part, _wider(of)), part.t)
+    if cost is None or not cost.harm:
+        return []
+    k = of.places.scale
+    text = (
+        f"the gyro's scale looks off by {100.0 * found.value:.2g} % (u {100.0 * found.u:.1g} %), where "
+        f"{100.0 * math.sqrt(of.covariance[k, k]):.2g} % is allowed for, which shifts the angle by "
+        f"{math.degrees(cost.shift):.2g} deg, {cost.ratio:.2g} times u: state gyro_scale under [prior], or correct the "
+        "scale under [sensors.gyro]"
+    )
+    return [Finding("prior_suspect", text, harm=EVERYTHING)]
