@@ -84,10 +84,11 @@ def whiteness(innovations: ArrayLike, lags: int = 20, blocks: Sequence[int] = (1
     from scipy.special import chdtr, chdtrc
 
     x = np.asarray(innovations, dtype=float)
-    total = np.zeros(x.shape[1])
+    filled, total = np.nan_to_num(np.ascontiguousarray(x.T)), np.zeros(x.shape[1])
+    squares = np.square(filled)
     for lag in range(1, lags + 1):
-        products = np.nan_to_num(x[lag:] * x[:-lag])
-        total += _ratio(np.square(products.sum(axis=0)), np.square(products).sum(axis=0))
+        sums, of_squares = (np.array([y[lag:] @ y[:-lag] for y in each]) for each in (filled, squares))
+        total += _ratio(np.square(sums), of_squares)
     chances = [chdtrc(lags, total)]
     for size in blocks:
         parts = x[: len(x) // size * size].reshape(-1, size, x.shape[1])

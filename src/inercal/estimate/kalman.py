@@ -34,8 +34,11 @@ def innovation_variance(P: Array, row: Row, size: int, noise: float) -> float:
     places, values = row.places, row.values
     total = noise
     for a in range(size):
-        for b in range(size):
-            total += values[a] * values[b] * P[places[a], places[b]]
+        line = P[places[a]]
+        half = 0.5 * values[a] * line[places[a]]
+        for b in range(a):
+            half += values[b] * line[places[b]]
+        total += 2.0 * values[a] * half
     return total
 
 
@@ -51,11 +54,11 @@ def scalar_update(P: Array, x: Array, row: Row, size: int, z: float, noise: floa
     """
     places, values = row.places, row.values
     n = len(x)
-    for i in range(n):
-        total = 0.0
-        for a in range(size):
-            total += P[i, places[a]] * values[a]
-        work[i] = total
+    work[:] = 0.0
+    for a in range(size):
+        line, value = P[places[a]], values[a]  # rows of P are its columns, and near each other
+        for i in range(n):
+            work[i] += line[i] * value
     variance, innovation = noise, z
     for a in range(size):
         variance += values[a] * work[places[a]]

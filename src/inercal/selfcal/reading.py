@@ -206,7 +206,7 @@ def _used_rows(t: Array, th: Array, rate: Array, where: str) -> tuple[NDArray[np
             f"expected {LIMITS.least_rows} or more",
         )
     findings = []
-    untimed = np.setdiff1d(np.arange(rows[0], len(t)), rows)
+    untimed = rows[0] + np.flatnonzero(~np.isfinite(t[rows[0] :]))
     if untimed.size:
         text = f"t: {counted(untimed.size, 'row')} without a time left out, the platform taken to turn on as before"
         findings.append(Finding("nan", text, places("row", untimed + 1)))

@@ -234,11 +234,12 @@ def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -
     m = P.shape[1]
     gain, own = work[0], work[1]
     for s in range(len(P)):
-        inner = r if s == 0 or s == source else 0.0
-        for i in range(m):
-            own[i] = 0.0
-            for k in range(size):
-                own[i] += P[s, i, places[k]] * values[k]
+        inner, part = r if s == 0 or s == source else 0.0, P[s]
+        own[:] = 0.0
+        for k in range(size):
+            line, value = part[places[k]], values[k]  # rows are columns, and near each other
+            for i in range(m):
+                own[i] += line[i] * value
         for k in range(size):
             inner += values[k] * own[places[k]]
         if s == 0:
@@ -247,9 +248,9 @@ def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -
         for i in range(m):
             own[i] -= 0.5 * inner * gain[i]
         for i in range(m):
-            by_gain, by_own = gain[i], own[i]
+            by_gain, by_own, line = gain[i], own[i], part[i]
             for k in range(m):
-                P[s, i, k] -= by_gain * own[k] + by_own * gain[k]  # symmetric to the last digit
+                line[k] -= by_gain * own[k] + by_own * gain[k]  # symmetric to the last digit
 
 
 class Path(NamedTuple):

@@ -292,11 +292,12 @@ def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array, shif
     places, values = row.places, row.values
     n, m = S.shape
     variance = r
-    for i in range(n):
-        gain[i] = 0.0
-        for a in range(size):
-            if places[a] < n:
-                gain[i] += P[i, places[a]] * values[a]
+    gain[:] = 0.0
+    for a in range(size):
+        if places[a] < n:
+            line, value = P[places[a]], values[a]  # rows are columns, and near each other
+            for i in range(n):
+                gain[i] += line[i] * value
     for a in range(size):
         if places[a] < n:
             variance += values[a] * gain[places[a]]
