@@ -132,31 +132,40 @@ def catalogue(rows: list[dict]) -> str:
         for each in sorted(rows, key=lambda row: row["draw"]):
             if each["system"] == system and each["fault"]:
                 of[each["fault"]].append(each)
-        if not of:
-            continue
-        lines += [
-            f"\n### {system}\n",
-            "| fault | shift [u] | verdicts | `ok` beyond 2 u | named | |",
-            "|---" * 6 + "|",
-        ]
-        for name in (each for each in module(system).faults() if each in of):
-            lines.append(entry(name, of[name]))
+        if of:
+            lines += [
+                f"\n### {system}\n",
+                "| fault | shift [u] | ended `ok` | what is said |",
+                "|---" * 4 + "|",
+            ]
+            faults = module(system).faults()
+            lines += [entry(name, of[name], faults[name].blind) for name in faults if name in of]
     return "\n".join(lines)
 
 
-def entry(name: str, rows: list[dict]) -> str:
+def entry(name: str, rows: list[dict], blind: str) -> str:
     """One fault as a row."""
     numbers = [each["shift"] for each in rows if each["status"] != "refused" and each["of"]]
     size = f"{np.sqrt(np.mean(np.square(numbers))):.2g}" if numbers else "–"
-    verdicts = Counter(each["status"] for each in rows)
-    codes = Counter(code for each in rows for code in each["named"])
-    off = [each for each in rows if each["status"] == "ok" and each["shift"] > HARMFUL]
-    told = sum(each["told"] for each in off)
-    what = "no data can show it" if rows[0]["blind"] else f"said in {told}" if told else ""
-    worst = f"{len(off)} (up to {max(each['shift'] for each in off):.2g} u)" if off else "0"
-    counts = ", ".join(f"{word} {count}" for word, count in verdicts.most_common())
-    named = ", ".join(f"`{code}` {count}" for code, count in codes.most_common(3))
-    return f"| {name} | {size} | {counts} | {worst} | {named} | {what} |"
+    ok = [each for each in rows if each["status"] == "ok"]
+    return f"| {name} | {size} | {len(ok)} of {len(rows)} | {said(rows, ok, blind)} |"
+
+
+def said(rows: list[dict], ok: list[dict], blind: str) -> str:
+    """What inercal says of a fault: found and by which names, in u, said though not found, or not seen."""
+    codes = Counter(code for each in rows for code in each["named"] or [each["status"]] if each not in ok)
+    names = ", ".join(f"`{code}`" for code, _ in codes.most_common(2))
+    off = [each for each in ok if each["shift"] > HARMFUL]
+    if blind:
+        return f"no data can show it: {blind}" + ("; said" if any(each["told"] for each in rows) else "")
+    if not ok:
+        return f"found: {names}"
+    else_in_u = "in u" if not codes else f"found in {len(rows) - len(ok)}: {names}; else in u"
+    if not off:
+        return else_in_u
+    hidden = f"{len(off)} beyond 2 u, up to {max(each['shift'] for each in off):.2g} u"
+    told = "hides, and is said" if all(each["told"] for each in off) else "**not seen**"
+    return f"{told}: {hidden}" + (f"; found in {len(rows) - len(ok)}: {names}" if codes else "")
 
 
 def main() -> None:
