@@ -11,9 +11,11 @@ import pytest
 from pyarrow import parquet
 from wires import HEADER, Datagrams, by_stream, free_port, rows, until, waiting, wire
 
-from inercal.live.address import sink_of
+from inercal.face.study import study_of
+from inercal.live.address import sink_of, source_of
 from inercal.live.counts import Spread, Stamps
-from inercal.live.measurement import measure
+from inercal.live.estimators import of_study
+from inercal.live.measurement import Measurement, Plan, measure
 from inercal.live.rows import Row, payload
 from inercal.live.sinks import Outlet
 
@@ -165,6 +167,34 @@ def test_it_ends_where_no_sink_is_left(study, tmp_path, request, quick):
 
     assert until(ended)
     assert "no sink is left, the measurement ends" in [alarm.message for alarm in running.alarms]
+
+
+def test_a_reader_that_leaves_ends_it_in_order(study, tmp_path):
+    """As of a stream: no failure, once standard output is the only sink."""
+    (tmp_path / "log.csv").write_bytes(HEADER + b"".join(rows(3000)))
+    printed = []
+
+    def print_line(text):
+        if printed:
+            raise OSError("its reader has left")
+        printed.append(text)
+
+    of = study_of(study)
+    plan = Plan(
+        source_of(f"replay:{tmp_path / 'log.csv'}?speed=1"),
+        lambda say, say_finding: of_study(of, 0.0, say, say_finding),
+        sinks=[sink_of("text:-")],
+    )
+    running = Measurement(plan, print_line=print_line)
+    running.start()
+    assert running.join(60.0)
+    assert (running.failure, running.incomplete) == ("", False)
+    assert running.counts.rows < 3000
+    said = [alarm.message for alarm in running.alarms]
+    assert said == [
+        "text:-: takes no more rows (its reader has left)",
+        "no sink is left, the measurement ends",
+    ]
 
 
 def test_files_that_are_there_are_left(study, tmp_path):

@@ -145,7 +145,8 @@ def _followed(measurement: Measurement, output: Output) -> int:
                 break
             if time.monotonic() >= due:
                 due += _EVERY
-                output.say(str(measurement.counts))
+                if measurement.columns:
+                    output.say(str(measurement.counts))
         except KeyboardInterrupt:
             if asked:  # a second one does not wait
                 raise

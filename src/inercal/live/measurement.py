@@ -190,9 +190,9 @@ class Measurement:
 
     @property
     def incomplete(self) -> bool:
-        """True where a sink or the recording has failed."""
+        """True where a sink or the recording has failed; a reader of standard output may leave."""
         failed = self._feed is not None and self._feed.record_failed
-        return failed or any(outlet.failure for outlet in self._outlets)
+        return failed or any(outlet.failure and outlet.name != "text:-" for outlet in self._outlets)
 
     def _work(self) -> None:
         """Prepare, run and end."""
@@ -253,7 +253,8 @@ class Measurement:
             for outlet in self._outlets:
                 outlet.offer(row)
             self._seen(row)
-            if self._outlets and self._plan.record is None and all(each.failure for each in self._outlets):
+            none_left = bool(self._outlets) and all(each.failure for each in self._outlets)
+            if none_left and self._plan.record is None and not self._stop.is_set():
                 self._said("no sink is left, the measurement ends")
                 self.stop()
 
