@@ -119,6 +119,8 @@ def test_a_program_measures_by_wire(bench):
     assert float(angles[-1]["theta [deg]"]) == pytest.approx(found["latest"]["theta"]["value"])
     assert ask("GET", "/files/..%2Fstudy.toml").status_code == 422
     json.dumps(found, allow_nan=False)
+    bench.drop(session)
+    assert bench.measurements.of(bench.sessions.begin_with("sting")) is None  # of the same number
 
 
 @pytest.mark.slow

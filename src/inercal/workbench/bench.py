@@ -288,6 +288,11 @@ class Bench:
         """The newest search for a plan of a session, None without any."""
         return next((job for job in self.queue if job.session == session.id and job.designs), None)
 
+    def drop(self, session: Session) -> None:
+        """Delete a session with its files; what is measured for it ends before."""
+        self.measurements.drop(session)
+        self.sessions.drop(session)
+
     def by_wire(self, kind: str) -> Session:
         """A new session with a study of that kind to measure by wire, without a recording; raises `InputError`."""
         if kind not in MEASURED:

@@ -169,7 +169,7 @@ CONFIG = {
     "scrollZoom": True,
     "modeBarButtonsToRemove": ["lasso2d", "select2d"],
 }
-"""How figures behave under the mouse."""
+"""Behaviour of figures under the mouse."""
 
 
 def _bands(rests: Sequence[tuple[float, float]], span: tuple[float, float] | None) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""How a measurement stands, as plain objects: for the page and for programs."""
+"""State of a measurement as plain objects: for the page and for programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from inercal.workbench.rest_detector import Rest
 
 
 def status(live: Live) -> dict[str, Any]:
-    """What is known of a measurement at this moment, as plain objects."""
+    """The measurement at this moment, as plain objects."""
     of = live.measurement
     counts = of.counts
     return {

@@ -31,7 +31,7 @@ FOLDER = "live"
 """Folder of recordings and sinks in that of a session."""
 
 MEASURED = {"aoa": "angle", "selfcal": "coefficients", "strapdown": "coefficients", "imu": "rest and noise"}
-"""What is measured by a study of each kind."""
+"""Quantities that a study of each kind measures."""
 
 MOST = 4
 """Measurements that may be at work at the same time."""
@@ -41,7 +41,7 @@ _PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class Wish:
-    """What is to be measured: address of the ``source``, name of a new file to ``record`` raw rows in (empty for
+    """A wish for a measurement: address of the ``source``, name of a new file to ``record`` raw rows in (empty for
     none), sinks to send the rows ``to``, and the interval [s] of these rows ``every``, 0 for one each sample."""
 
     source: str
@@ -112,6 +112,12 @@ class Measurements:
             raise InputError(session.title, "is not measured")
         live.measurement.stop()
         return live
+
+    def drop(self, session: Session) -> None:
+        """End the measurement of a session, if there is one, and forget it."""
+        live = self._held.pop(session.id, None)
+        if live is not None:
+            live.measurement.stop(_PATIENCE)
 
     def close(self) -> None:
         """End all measurements."""
@@ -239,7 +245,7 @@ def next_name(session: Session) -> str:
 
 
 def recordings(session: Session) -> list[Path]:
-    """What measurements have recorded or written, in the order of the names."""
+    """Files that measurements have recorded or written, in the order of the names."""
     folder = session.folder / FOLDER
     return sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
 

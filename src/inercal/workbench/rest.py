@@ -74,7 +74,7 @@ def rest_of(bench: Bench) -> FastAPI:
     @app.delete("/sessions/{number}", status_code=204)
     def drop(number: str) -> Response:
         """Delete a session with its files; its jobs stay."""
-        bench.sessions.drop(bench.sessions.get(number))
+        bench.drop(bench.sessions.get(number))
         return Response(status_code=204)
 
     @app.put("/sessions/{number}/files/{name:path}", status_code=201)

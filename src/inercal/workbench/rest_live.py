@@ -44,7 +44,7 @@ def add_live(app: FastAPI, bench: Bench, file: Callable[[Path, str], FileRespons
 
     @app.get("/sessions/{number}/live")
     def look(number: str) -> dict[str, Any]:
-        """How a measurement stands: state, rest, last values with u, channels, counts, alarms."""
+        """A measurement at this moment: state, rest, last values with u, channels, counts, alarms."""
         return status(of(number))
 
     @app.get("/sessions/{number}/live/rows")

@@ -39,7 +39,7 @@ def add(bench: Bench) -> None:
     """Add the pages: of one session, and of all that is measured."""
 
     @ui.page("/sessions/{number}/live")
-    def of_session(number: str) -> None:
+    def show(number: str) -> None:
         session = bench.sessions.get(number)
         with framed("Live measurement", session, "live"):
             if session.study is None:
@@ -49,7 +49,7 @@ def add(bench: Bench) -> None:
             _Desk(bench, session)
 
     @ui.page("/live")
-    def of_all() -> None:
+    def at_work() -> None:
         def begin(kind: str) -> None:
             with told():
                 session = bench.by_wire(kind)
@@ -57,10 +57,10 @@ def add(bench: Bench) -> None:
 
         with framed("Live"):
             heading("At work")
-            at_work = bench.measurements.at_work
-            if not at_work:
+            going_on = bench.measurements.at_work
+            if not going_on:
                 ui.label("Nothing is measured now.")
-            for number, live in at_work.items():
+            for number, live in going_on.items():
                 ui.link(f"Session {number}: {live.command}", f"/sessions/{number}/live")
             heading("Measure an instrument by wire")
             ui.label(
@@ -172,7 +172,7 @@ class _Desk:
         self.fields.set_visibility(begin)
 
     def _recorded(self) -> None:
-        """What was recorded or written, to take elsewhere or to work on."""
+        """Files that were recorded or written, to take elsewhere or to work on."""
         found = recordings(self.session)
         if [path.name for path in found] == self._names:
             return
@@ -200,7 +200,7 @@ class _Desk:
 
 
 class _View:
-    """What is seen of a measurement: picture, results, channels, counts, alarms."""
+    """The view of a measurement: picture, results, channels, counts, alarms."""
 
     def __init__(self, live: Live) -> None:
         self.live, self.over = live, False
