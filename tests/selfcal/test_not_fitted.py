@@ -9,6 +9,8 @@ from independent.selfcal import THREE, TRUTH, Drive, Faults, G
 import inercal as ic
 from inercal.findings import Status
 
+pytestmark = pytest.mark.slow
+
 KINDS = '"k2", "levers", "harmonics", "scale_asymmetry", "g_sensitivity", "sag"'
 
 
