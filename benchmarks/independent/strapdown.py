@@ -64,7 +64,8 @@ def unit(rng):
 class Faults:
     """What goes wrong.
 
-    ``ramp_gyro`` [rad/s] and ``ramp_acc`` [m/s^2] over the test, ``clip`` of the rate [rad/s], ``sway`` speed [m/s] of
+    ``ramp_gyro`` [rad/s] and ``ramp_acc`` [m/s^2] over the test, ``walk_gyro`` [rad/s/sqrt(s)] and ``walk_acc``
+    [m/s^2/sqrt(s)] random walks of biases, ``clip`` of the rate [rad/s], ``sway`` speed [m/s] of
     a slow motion that never rests, ``knock`` [m/s] that the accelerometers alone see in a rest, ``lost`` samples in the
     middle of a turn whose stamps were made up, ``clock`` its relative error, ``square`` of a rate [s/rad], ``low_pass``
     time constant [s] of a filter in the gyros that the accelerometers lack.
@@ -72,6 +73,8 @@ class Faults:
 
     ramp_gyro: float = 0.0
     ramp_acc: float = 0.0
+    walk_gyro: float = 0.0
+    walk_acc: float = 0.0
     clip: float = np.inf
     sway: float = 0.0
     knock: float = 0.0
@@ -186,6 +189,9 @@ def record(rng, made, test, fault=Faults()):  # noqa: B008
     acc = acc + np.einsum("nji,nj->ni", C[STEPS // 2 :: STEPS][:count], np.diff(vibration, axis=0)) / ts
     acc += test.velocity_walk / np.sqrt(ts) * rng.standard_normal(acc.shape)
     gyro = gyro + test.angle_walk / np.sqrt(ts) * rng.standard_normal(gyro.shape)
+    if fault.walk_gyro or fault.walk_acc:
+        gyro = gyro + fault.walk_gyro * np.sqrt(ts) * np.cumsum(rng.standard_normal(gyro.shape), axis=0)
+        acc = acc + fault.walk_acc * np.sqrt(ts) * np.cumsum(rng.standard_normal(acc.shape), axis=0)
     if fault.lost:
         gone = round((test.first + 0.5 * test.turn) * test.rate) + np.arange(fault.lost)
         acc, gyro = np.delete(acc, gone, axis=0), np.delete(gyro, gone, axis=0)

@@ -127,6 +127,19 @@ def test_a_better_path_is_found(turns, start, most):
     assert u_by_kind(fit)["scale"] < 1.2
 
 
+@pytest.mark.campaign
+def test_twelve_turns_are_within_a_third_of_eighteen_in_the_same_time():
+    """From a level start, in the 592 s of 19 positions; twelve leave more time for each rest."""
+    usual, found = bounds(Pieces(NAV), NAV.plan), {}
+    for turns in (12, 18):
+        asked = Design(turns, start="plan", time=592.0)
+        found[turns] = design(replace(NAV, plan=Plan((), LEVEL, first_dwell=70.0), design=asked))
+        assert found[turns].plan.duration == pytest.approx(592.0)
+    by_mean = {turns: np.exp(np.mean(np.log(each.bounds.u / usual.u))) for turns, each in found.items()}
+    assert by_mean[18] < 0.85
+    assert by_mean[12] < 1.3 * by_mean[18]
+
+
 def test_goals_weigh():
     """A goal that is stated takes the place of the usual one; S_asym is twice the half that the study states."""
     settings = replace(
