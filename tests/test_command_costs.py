@@ -85,8 +85,8 @@ def test_a_command_loads_no_library_that_it_does_not_need(command, folder):
 
 
 BYTES = {
-    "inspect long.csv": 260,
-    "aoa long.csv --study aoa.toml": 760,
+    "inspect long.csv": 200,
+    "aoa long.csv --study aoa.toml": 660,
     "selfcal turning.csv --study selfcal.toml": 1500,
 }
 """Most bytes of memory for a row of 5 numbers of text, of a platform 10: 700 000 of these take 1 GiB."""
@@ -108,11 +108,13 @@ def turning(folder, count):
 
 
 PEAK = """
-import resource, sys
+import re, sys
+from pathlib import Path
 from inercal.cli import run
 run(sys.argv[1:])
-print("peak:", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print("peak:", re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_text())[1])
 """
+"""Of the process itself: the largest size in `resource.getrusage` is that of its parent, where this is larger."""
 
 
 @pytest.mark.slow
@@ -123,9 +125,9 @@ print("peak:", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 )
 def test_memory_grows_by_no_more_than_so_many_bytes_a_row(command, folder):
     peaks = {}
-    for count in (30_000, 90_000):
+    for count in (100_000, 200_000):  # both of them long enough to be read by compiled rows
         (turning if "turning" in command else lengthened)(folder, count)
         words = [sys.executable, "-c", PEAK, *command.split(), "--quiet"]
         done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True)
         peaks[count] = int(done.stdout.rpartition("peak:")[2]) * 1024
-    assert (peaks[90_000] - peaks[30_000]) / 60_000 < BYTES[command]
+    assert (peaks[200_000] - peaks[100_000]) / 100_000 < BYTES[command]

@@ -130,7 +130,7 @@ def _missing(grid: Array, t: Array, lost: NDArray[np.bool_], step: float) -> NDA
 
 
 def _moved(values: Array, steps: float) -> Array | None:
-    """What even samples (n,) are so many ``steps`` later, by Lagrange's cubic through the two on either side.
+    """Even samples (n,) as they are so many ``steps`` later, by Lagrange's cubic through the two on either side.
 
     A straight line in the first and last interval, constant beyond them; None where nothing is left.
     """
