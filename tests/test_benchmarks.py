@@ -227,3 +227,30 @@ def test_a_run_without_end_is_ended_in_any_thread(monkeypatch):
     assert found.outcome == "failed"
     assert found.wrong[0].startswith("TooLongError: no end within 0.1 s")
     assert runs.one("drift", 3).outcome == expected.outcome
+
+
+def test_the_catalogue_of_faults_counts_what_ends_ok(tmp_path):
+    """By hand: of four recordings shifted by more than 2 u one is unsaid, one said, one seen by no data."""
+    import faults
+
+    def made(draw, status, shift, told=False, blind=False, name="late"):
+        row = {"system": "imu", "fault": name, "draw": draw, "status": status, "shift": shift}
+        return row | {"of": "S_x", "named": [], "told": told, "blind": blind}
+
+    rows = [
+        made(0, "ok", 3.0),
+        made(1, "ok", 3.0, told=True),
+        made(2, "ok", 3.0, blind=True),
+        made(3, "suspect", 3.0),
+        made(4, "ok", 1.0),
+        made(0, "ok", 0.0, name=""),
+        made(1, "suspect", 0.0, name=""),
+    ]
+    found = faults.judged(rows)
+    assert [found[key] for key in ("all", "harmed", "untold", "told", "blind")] == [5, 3, 1, 1, 1]
+    assert [found[key] for key in ("sound", "not_ok")] == [2, 1]
+    # none of n: 1 - 0.05^(1/n)
+    assert faults.upper(0, 150) == pytest.approx(1.0 - 0.05 ** (1.0 / 150.0))
+    path = tmp_path / "rows.jsonl"
+    path.write_text("\n".join(json.dumps(each) for each in [*rows, rows[0]]) + '\n{"system": "im', "utf-8")
+    assert faults.read(path) == rows

@@ -44,6 +44,7 @@ SLOW = [
     "docs/theory/angle-of-attack-fusion.md",
     "docs/theory/self-calibration-filters.md",
     "docs/tutorials/angle-of-attack.md",
+    "docs/tutorials/bench-to-certificate.md",
     "docs/tutorials/five-years.md",
     "docs/tutorials/self-calibration.md",
     "docs/tutorials/strapdown.md",
