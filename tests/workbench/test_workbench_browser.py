@@ -198,8 +198,7 @@ def test_files_dropped_together_are_one_recording_and_a_wrong_one_does_not_stop_
         bench.ask(f"/api/v1/sessions/{number}/files/study-map.toml")[1].encode()
         == (FOLDER / example.map).read_bytes()
     )
-    box = page.locator('[aria-label="channels over time"]').bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 3)
+    page.locator(".js-plotly-plot .nsewdrag").first.hover(force=True)
     page.wait_for_function(  # one cursor for both sensors
         "['acc_x', 'gyro_z'].every(name => document.querySelector('.hoverlayer').textContent.includes(name))"
     )

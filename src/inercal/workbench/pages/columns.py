@@ -60,7 +60,7 @@ def columns_there(session: Session) -> dict[Path, tuple[str, ...]]:
 
 
 def _written(origin: Any) -> str:
-    """Where a channel is found, as the map writes it."""
+    """The place of a channel in its file, as the map writes it."""
     return json.dumps(list(origin) if isinstance(origin, tuple) else origin, ensure_ascii=False)
 
 

@@ -49,7 +49,6 @@ def framed(title: str, session: Session | None = None, step: str = "") -> Iterat
         with ui.element("h1"):
             ui.label(title)
         yield
-        _words_of_uploads()
 
 
 def _way(target: str, words: str, here: bool) -> None:
@@ -57,15 +56,6 @@ def _way(target: str, words: str, here: bool) -> None:
     link = ui.link(words, target)
     if here:
         link.props('aria-current="page"').classes("font-bold no-underline")
-
-
-def _words_of_uploads() -> None:
-    """The line at the foot of the window that says how far an upload is, and what was copied or refused."""
-    ui.html(
-        '<div id="upload-words" role="status" hidden><span></span> <progress max="1" aria-label="upload" hidden>'
-        '</progress> <a href="/" hidden>Go on with the others</a></div>',
-        sanitize=False,
-    )
 
 
 def refused(error: BaseException) -> None:

@@ -50,7 +50,7 @@ def add(bench: Bench) -> None:
 
 
 def _title(example: Example) -> str:
-    """What an example is; and its command, where that has no page here."""
+    """The title of an example; with its command, where that has no page here."""
     has_page = tuple(example.verb.split()) in COMMANDS.values()
     return (
         example.title if has_page else f"{example.title}; to look at, its command is inercal {example.verb}"
@@ -74,7 +74,7 @@ def drop() -> None:
 
 
 def _watched(bench: Bench, every: bool) -> None:
-    """What is at work or waits, and the sessions; drawn anew when a job begins or ends."""
+    """Jobs that run or wait, and the sessions; drawn anew when a job begins or ends."""
     place = ui.element("div").classes("w-full flex flex-col gap-3")
     at_work: list[tuple[str, State]] | None = None
     progress: dict[str, ui.label] = {}

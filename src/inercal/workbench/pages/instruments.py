@@ -70,7 +70,7 @@ def add(bench: Bench) -> None:
 
 
 async def _history(bench: Bench, serial: str) -> None:
-    """How each coefficient of an instrument moved; raises `InputError`."""
+    """The course of each coefficient of an instrument; raises `InputError`."""
     from inercal.face.laboratory import history
 
     heading("History")
@@ -86,7 +86,7 @@ async def _history(bench: Bench, serial: str) -> None:
 
 
 def _kept(results: Sequence[Listed], certificates: Sequence[Mapping[str, Any]]) -> None:
-    """What was kept of an instrument, the newest first."""
+    """Results and certificates of an instrument, the newest first."""
     heading("Results")
     table(
         ["Date", "Result", "Command", "Verdict", ""],

@@ -1,8 +1,13 @@
 // Files dropped anywhere, or chosen, go to the workbench one by one as they are; what it says of them stands in one line.
 (() => {
+  const line = document.createElement('div'); // beside the page, which is drawn anew at any time
+  line.id = 'upload-words';
+  line.hidden = true;
+  line.innerHTML = '<span></span> <progress max="1" aria-label="upload" hidden></progress> '
+    + '<a href="/" hidden>Go on with the others</a>';
+  document.body.append(line);
+
   const shown = (words, part = null, alarm = false) => {
-    const line = document.getElementById('upload-words');
-    if (!line) return;
     line.querySelector('span').textContent = words;
     line.classList.toggle('bad', alarm);
     line.setAttribute('role', alarm ? 'alert' : 'status');
@@ -10,7 +15,6 @@
     bar.hidden = part === null;
     bar.value = part ?? 0;
     line.hidden = !words;
-    return line;
   };
 
   const put = (session, file, told) => new Promise((done, failed) => {
@@ -59,8 +63,8 @@
     }
     const target = `/sessions/${session}/recording?new=1`;
     if (!refused.length) { location.assign(target); return; }
-    const line = shown(refused.join('; '), null, true);
-    if (!line || refused.length === files.length) return;
+    shown(refused.join('; '), null, true);
+    if (refused.length === files.length) return;
     const link = line.querySelector('a');
     link.href = target;
     link.hidden = false;
