@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING
 from inercal.errors import MapError, RecordError
 from inercal.live.intake import Arrival, Intake
 from inercal.records.frames import Frame, Turns, frames_in
+from inercal.records.places import counted_names, shortened
 from inercal.records.read.table import FileOptions, Part
 from inercal.units import shown
 
@@ -203,9 +204,10 @@ def _as_text(record_map: RecordMap | None, frame: Frame) -> RecordMap | None:
     for channel in part.channels or ():
         origin = names.index(channel.origin) if channel.origin in names else channel.origin
         if not isinstance(origin, int) or not 0 <= origin < len(names):
+            held = counted_names([shortened(name) for name in names], 12)
             raise MapError(
                 f"{record_map.path}: columns.{channel.name}.from",
-                f"found no {shown(channel.origin)} in the frame ({', '.join(names)}), expected it there",
+                f"found no {shown(channel.origin)} in the frame ({held}), expected it there",
             )
         channels.append(replace(channel, origin=origin))
     as_text = Part(tuple(channels), FileOptions(delimiter=",", decimal=".", comment=""))

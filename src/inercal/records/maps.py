@@ -123,7 +123,7 @@ class FileEntry(Strict):
         for each in [value] if isinstance(value, str) else value or ():
             unused = isinstance(value, list) and re.fullmatch(r"x[1-9]\d{0,3}", each)
             if not unused and not re.fullmatch(r"[<>](f[48]|[iu][248])|[iu]1", each):
-                raise ValueError(f'found {each!r}, expected a type such as "<f4", ">i2" or "u1"')
+                raise ValueError(f'expected a type such as "<f4", ">i2" or "u1", not {shown(each)}')
         return value
 
     @field_validator("sync")
