@@ -240,22 +240,34 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
 
 
 def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
-    """``command_shift``: a delay of the gyro by the spectra that is not that of the fusion, and costs more than u.
-
-    The fusion may not learn one that is far from the study's.
+    """``command_shift``: a delay that costs more than u and that nobody stated. It is the gyro's, by the spectra, where
+    the fusion does not learn it, for it may not go far from the study's; or that of the accelerometers, and so of the
+    angle, where the gyro comes before them.
     """
     k = problem.places.delay
-    if delay is None or k < 0:
-        return []
-    off = delay.value - float(filtered.state.x[k])
     known = np.isfinite(filtered.u) & np.isfinite(filtered.rate)
-    cost = abs(off) * float(np.sqrt(np.mean(np.square(filtered.rate[known])))) if known.any() else 0.0
-    if abs(off) <= LIMITS.delay_sigmas * delay.u or not cost > float(np.median(filtered.u[known])):
+    if k < 0 or not known.any():
         return []
-    side = "later" if delay.value > 0.0 else "earlier"
+    rate, u = float(np.sqrt(np.mean(np.square(filtered.rate[known])))), float(np.median(filtered.u[known]))
+    tau, constants = float(filtered.state.x[k]), problem.constants
+    if delay is not None:
+        off = abs(delay.value - tau)
+        if off > LIMITS.delay_sigmas * delay.u and off * rate > u:
+            side = "later" if delay.value > 0.0 else "earlier"
+            text = (
+                f"gyro comes {1e3 * abs(delay.value):.2g} ms {side} than the accelerometers by the spectra, which the "
+                f'fusion does not learn: write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
+            )
+            return [Finding("command_shift", text, harm=EVERYTHING)]
+    late = -tau - constants.common_delay
+    late_u = math.hypot(math.sqrt(filtered.state.P[k, k]), constants.common_delay_u)
+    if not (late > LIMITS.delay_sigmas * late_u and late * rate > u):
+        return []
     text = (
-        f"gyro comes {1e3 * abs(delay.value):.2g} ms {side} than the accelerometers by the spectra, which the fusion "
-        f'does not learn: write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
+        f"accelerometers come {-1e3 * tau:.2g} ms later than the gyro, and the angle with them: "
+        f"{math.degrees(late * rate):.2g} deg at the rates of this recording; write "
+        f'common_delay = "{-1e3 * tau:.3g} ms" under [timing], or gyro_delay = "{1e3 * tau:.3g} ms" there where it is the '
+        "stamps of the gyro that are early"
     )
     return [Finding("command_shift", text, harm=EVERYTHING)]
 
