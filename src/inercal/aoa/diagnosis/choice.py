@@ -266,8 +266,8 @@ def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult
     text = (
         f"accelerometers come {-1e3 * tau:.2g} ms later than the gyro, and the angle with them: "
         f"{math.degrees(late * rate):.2g} deg at the rates of this recording; write "
-        f'common_delay = "{-1e3 * tau:.3g} ms" under [timing], or gyro_delay = "{1e3 * tau:.3g} ms" there where it is the '
-        "stamps of the gyro that are early"
+        f'common_delay = "{-1e3 * tau:.3g} ms" under [timing], or gyro_delay = "{1e3 * tau:.3g} ms" there where it is '
+        "the stamps of the gyro that are early"
     )
     return [Finding("command_shift", text, harm=EVERYTHING)]
 
