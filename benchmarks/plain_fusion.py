@@ -57,12 +57,16 @@ class Model:
         """What the four sensors should read at a prediction, and their derivatives (4, n).
 
         Positions and the gyro's scale are learned by the motion of the row ``before``, of covariance ``P``, and not
-        where that is but noise.
+        where that is but noise: of a rate at most that of the gyro, however little is known at the start.
         """
         told, H = zip(*(self.read(x, i, before) for i in range(4)), strict=True)
         told, H = np.array(told), np.array(H)
         if self.full:
-            w, al = (max(0.0, 1.0 - 9.0 * P[j, j] / before[j] ** 2) if before[j] else 0.0 for j in (1, 2))
+            noise = (min(P[1, 1], self.variances[3]), P[2, 2])
+            w, al = (
+                max(0.0, 1.0 - 9.0 * of / by**2) if by else 0.0
+                for of, by in zip(noise, before[1:3], strict=True)
+            )
             H[:, ARMS : ARMS + 3] *= max(w, al)
             H[:, HEIGHTS : HEIGHTS + 3] *= max(w, al)
             H[:, SCALE] *= w

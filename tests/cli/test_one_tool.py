@@ -28,7 +28,7 @@ BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
 READ_A_RECORD = {
     *("inspect", "calibrate imu", "calibrate strapdown", "calibrate turntable", "selfcal", "aoa"),
-    *("allan", "temperature", "apply", "monitor", "batch"),
+    *("allan", "temperature", "apply", "monitor", "live", "batch"),
 }
 READ_A_STUDY = {
     *(
@@ -40,11 +40,12 @@ READ_A_STUDY = {
         "sensitivity",
         "design positions",
         "batch",
+        "live",
     ),
     *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
-WITHOUT_A_FILE = {"monitor", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
+WITHOUT_A_FILE = {"monitor", "live", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
     f"store {kind}" for kind in ("init", "upgrade", "check", "export", "import")
 }
 TEMPLATES = {
@@ -82,8 +83,8 @@ def test_an_option_has_one_kind_of_value_and_one_text_in_all_commands(helps):
     """Whoever knows one command knows the options of the others; --compare, --filter and --stream say what each has.
 
     --runs is a number of simulated runs, and of `aoa` the table that lists them; `keep` is given a --report; --out of
-    `batch` is a folder."""
-    own = {"--compare", "--filter", "--stream", "--runs", "--report", "--out"}
+    `batch` is a folder; --to is a tool for `convert`, and a sink of `live`."""
+    own = {"--compare", "--filter", "--stream", "--runs", "--report", "--out", "--to"}
     meanings = {}
     for command, text in helps.items():
         for name, (value, words) in options(text).items():
@@ -92,7 +93,7 @@ def test_an_option_has_one_kind_of_value_and_one_text_in_all_commands(helps):
             )
     assert len(meanings) > 20
     for name, found in meanings.items():
-        assert len({value for value, _ in found}) == (2 if name == "--runs" else 1), name
+        assert len({value for value, _ in found}) == (2 if name in {"--runs", "--to"} else 1), name
         assert len(found) == 1 or name in own, (name, found)
 
 
@@ -135,7 +136,8 @@ def test_every_help_has_one_shape(helps):
         assert used.startswith(f"Usage: inercal {command} ")
         arguments = re.findall(r"^ {2}([A-Z]+): (.*)$", text, re.MULTILINE)
         named = [name if words.endswith("[required]") else f"[{name}]" for name, words in arguments]
-        needed = ["--study", "PATH"] if "--study" in options(text) else []
+        needs = "--study" in options(text) and command != "live"  # or a calibration, by --apply
+        needed = ["--study", "PATH"] if needs else []
         needed = ["--reason", "STR"] if "--reason" in options(text) else needed
         assert used.split()[2 + len(command.split()) :] == [*named, *needed, "[OPTIONS]"]
         names = list(options(text))

@@ -3,6 +3,8 @@
 import pytest
 from wires import STUDY, Mosquitto
 
+from inercal.live import intake, pieces
+
 
 @pytest.fixture
 def study(tmp_path):
@@ -29,5 +31,5 @@ def broker(shared_broker, monkeypatch):
 @pytest.fixture
 def quick(monkeypatch):
     """Short pauses, and pieces of a fifth of a second."""
-    monkeypatch.setattr("inercal.live.intake.PAUSES", (0.05, 0.2))
-    monkeypatch.setattr("inercal.live.pieces.SPAN", 0.2)
+    monkeypatch.setattr(intake, "PAUSES", (0.05, 0.2))
+    monkeypatch.setattr(pieces, "SPAN", 0.2)

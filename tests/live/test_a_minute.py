@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from wires import HEADER, Cable, Mosquitto, by_stream, free_port, rows, until, waiting
 
+from inercal.live import measurement
+
 SENDER = Path(__file__).with_name("sender.py")
 
 
@@ -32,7 +34,7 @@ def _newest(running):
     ids=["minute", "ten minutes"],
 )
 def test_every_row_is_used_or_counted(seconds, study, tmp_path, broker, monkeypatch, record_property):
-    monkeypatch.setattr("inercal.live.measurement.KEPT", 300)
+    monkeypatch.setattr(measurement, "KEPT", 300)
     sent = rows(1000 * seconds)
     (tmp_path / "rows.csv").write_bytes(HEADER + b"".join(sent))
     cable, port, listening = Cable(tmp_path), free_port(socket.SOCK_DGRAM), socket.socket()

@@ -12,6 +12,7 @@ from pyarrow import parquet
 from wires import HEADER, Datagrams, by_stream, free_port, rows, until, waiting, wire
 
 from inercal.face.study import study_of
+from inercal.live import sinks
 from inercal.live.address import sink_of, source_of
 from inercal.live.counts import Spread, Stamps
 from inercal.live.estimators import of_study
@@ -110,8 +111,8 @@ def test_values_in_messages_have_unit_and_uncertainty():
 
 def test_a_slow_sink_stops_nobody(study, tmp_path, monkeypatch, request):
     """A pipe that nobody empties: it fills, rows for it are dropped and counted, all others get them."""
-    monkeypatch.setattr("inercal.live.sinks.ROOM", 200)
-    monkeypatch.setattr("inercal.live.sinks.GOODBYE", 0.2)
+    monkeypatch.setattr(sinks, "ROOM", 200)
+    monkeypatch.setattr(sinks, "GOODBYE", 0.2)
     os.mkfifo(tmp_path / "pipe")
     reading = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     near, address = wire("tcp", tmp_path)

@@ -37,7 +37,7 @@ def live(
     *,
     study: Annotated[
         Path | None,
-        Parameter(help="Study file (TOML) of kind aoa, selfcal, strapdown or imu (rest and noise)."),
+        Parameter(help="Study file (TOML); `inercal new` writes one."),
     ] = None,
     calibration: Annotated[
         Path | None,

@@ -136,12 +136,12 @@ def _wandering(case: Case, now: FilterResult, settings: SelfcalSettings) -> list
     kinds = [kind for kind in walks for _ in range(3)]
     sigma = settings.priors[[ALL.index(name) for kind in walks for name in STATES[kind].parameters]]
     lasts = float(recording.t[-1] - recording.t[0])
-    through, ratio = (recording.t - recording.t[0]) / lasts, LIMITS.walk_time / lasts
+    through, held = (recording.t - recording.t[0]) / lasts, lasts / LIMITS.walk_time
     waves = []
     for j in range(LIMITS.wandering + 1):
         course = replace(recording, warm=np.cos(j * math.pi * through)), of
         # spectrum of the process at half periods over the recording; that of a mean is half of it
-        part = math.sqrt(min((4.0 if j else 2.0) * ratio / (1.0 + (j * math.pi * ratio) ** 2), 1.0))
+        part = math.sqrt(min((4.0 if j else 2.0) / (held + (j * math.pi) ** 2 / held), 1.0))
         waves.append(_of_names(course, now, names, kinds, part * sigma))
     return waves
 
