@@ -1,6 +1,7 @@
 """Pages without a browser: NiceGUI's own user, for what a page says and does."""
 
 import asyncio
+import sys
 from functools import wraps
 
 from nicegui import Client
@@ -29,7 +30,11 @@ def of_user(test):
             finally:
                 bench.close()
 
-        asyncio.run(simulated())
+        ours = {name: module for name, module in sys.modules.items() if name.partition(".")[0] == "inercal"}
+        try:
+            asyncio.run(simulated())
+        finally:  # NiceGUI forgets the modules of pages and all above them: ours would be there twice
+            sys.modules.update(ours)
 
     del run.__wrapped__
     return run
