@@ -258,6 +258,19 @@ def test_a_run_goes_on_over_reloads_and_in_two_tabs(tab, bench):
     watched.sound()
 
 
+def test_dark_is_kept_from_page_to_page(tab, bench):
+    page, watched = tab
+    page.goto(bench.base)
+    page.click('button:has-text("Dark")')
+    page.wait_for_function("document.cookie.includes('inercal-dark=1')")
+    page.goto(f"{bench.base}/validation")
+    page.wait_for_selector("body.body--dark")
+    page.click('button:has-text("Light")')
+    page.wait_for_function("document.cookie.includes('inercal-dark=0')")
+    page.context.clear_cookies(name="inercal-dark")  # other tests go by the system
+    watched.sound()
+
+
 def test_a_run_is_cancelled(tab, bench):
     _, session = bench.ask("/api/v1/sessions", {"example": "selfcal"})
     page, watched = tab

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from nicegui import ui
+from starlette.requests import Request
 
 from inercal.workbench.bench import said_of
 from inercal.workbench.jobs import Job
@@ -23,6 +24,11 @@ _STEPS = (
 PATIENCE = 120.0
 """Time [s] that a page may take where it reads files, on a busy machine."""
 
+_DARK = "inercal-dark"
+"""Cookie of the browser that keeps whether pages are dark; without it they are as the system is."""
+
+_CHOSEN = {"0": False, "1": True}
+
 _PLACES = (("/", "Home"), ("/live", "Live"), ("/instruments", "Instruments"), ("/validation", "Validation"))
 
 
@@ -33,14 +39,19 @@ def framed(title: str, session: Session | None = None, step: str = "") -> Iterat
     ui.colors(primary="#2F6690", negative="#C03A2B", positive="#1E7A4C")
     ui.add_head_html('<link rel="stylesheet" href="/static/bench.css">')
     ui.add_head_html('<script src="/static/bench.js" defer></script>')
-    dark = ui.dark_mode(value=None)
+    dark = ui.dark_mode(value=_CHOSEN.get(_request().cookies.get(_DARK, "")))
+
+    def choose(on: bool) -> None:
+        dark.set_value(on)
+        ui.run_javascript(f"document.cookie = '{_DARK}={int(on)}; path=/; SameSite=Strict; max-age=31536000'")
+
     with ui.element("nav").props('aria-label="pages"').classes("w-full flex gap-4 items-center"):
         ui.label("inercal workbench").classes("font-bold")
         for target, words in _PLACES:
             _way(target, words, words == title)
         ui.space()
-        button("Light", dark.disable)
-        button("Dark", dark.enable)
+        button("Light", lambda: choose(False))
+        button("Dark", lambda: choose(True))
     if session is not None:
         with ui.element("nav").props('aria-label="steps"').classes("w-full flex gap-4"):
             for name, words in _STEPS:
@@ -49,6 +60,13 @@ def framed(title: str, session: Session | None = None, step: str = "") -> Iterat
         with ui.element("h1"):
             ui.label(title)
         yield
+
+
+def _request() -> Request:
+    """The request for the page that is being made."""
+    request = ui.context.client.request
+    assert request is not None
+    return request
 
 
 def _way(target: str, words: str, here: bool) -> None:
