@@ -23,7 +23,7 @@ from independent import strapdown
 from inercal.findings import CODES, Harm, Status
 from inercal.geometry.site import Site
 from inercal.records.record import record_of
-from inercal.strapdown.settings import ESTIMABLE, Noise, Prior, Rests, StrapdownSettings
+from inercal.strapdown.settings import TURN_NOISE, Noise, Prior, Rests, StrapdownSettings
 from inercal.strapdown.task import calibrate
 from inercal.units import parse_unit
 
@@ -36,7 +36,7 @@ SETTINGS = StrapdownSettings(
     prior=Prior(30 * DPH, 1e-3, 1e-3, 5e-2, 1e-3, 1e-3, 1e-5, 0.05, 5e-3, 5e-4, 50 * DPH / 9.8),
 )
 WALKS = {"gyros": {"walk_gyro": 0.1 * DPH}, "accelerometers": {"walk_acc": 3.0 * strapdown.UG}}
-SHOWN = {"noise": replace(SETTINGS.noise, estimate=ESTIMABLE)}
+STILL = {"noise": replace(SETTINGS.noise, estimate=TURN_NOISE)}
 #: name -> (fault, change of the unit, change of the study)
 CASES = {
     "none": ({}, {}, {}),
@@ -56,8 +56,8 @@ CASES = {
         for size in (5e-5, 5e-4)
     },
     **{f"biases of {sensor} walk": (walk, {}, {}) for sensor, walk in WALKS.items()},
-    **{f"biases of {sensor} walk, estimated": (walk, {}, SHOWN) for sensor, walk in WALKS.items()},
-    "no walk, but estimated": ({}, {}, SHOWN),
+    **{f"biases of {sensor} walk, stated as 0": (walk, {}, STILL) for sensor, walk in WALKS.items()},
+    "no walk, stated as 0": ({}, {}, STILL),
     **{f"latitude wrong by {size:g} deg": ({}, {}, {"wrong": np.radians(size)}) for size in (1.0, 10.0)},
     **{f"sway of {1e3 * size:g} mm/s at rest": ({"sway": size}, {}, {}) for size in (5e-4, 5e-3)},
     "a knock of 5 mm/s in a rest": ({"knock": 5e-3}, {}, {}),

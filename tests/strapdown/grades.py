@@ -9,7 +9,7 @@ from inercal.geometry.site import Site
 from inercal.strapdown.batch import fit
 from inercal.strapdown.coefficients import SIZE, free_places
 from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.settings import Noise, Plan, Prior, Rests, StrapdownSettings
+from inercal.strapdown.settings import TURN_NOISE, Noise, Plan, Prior, Rests, StrapdownSettings
 from inercal.strapdown.simulate import simulated
 from inercal.units import parse_quantity
 
@@ -34,7 +34,11 @@ _LATITUDE = np.radians(34.0)
 
 NAV = StrapdownSettings(
     site=Site(float(gravity(_LATITUDE)), (), _LATITUDE),
-    noise=Noise(si("5e-4 deg/sqrt(h)", "angle random walk"), si("5 ug/sqrt(Hz)", "velocity random walk")),
+    noise=Noise(
+        si("5e-4 deg/sqrt(h)", "angle random walk"),
+        si("5 ug/sqrt(Hz)", "velocity random walk"),
+        estimate=TURN_NOISE,
+    ),
     prior=Prior(
         gyro_bias=si("1 deg/h", "rate"),
         scale=300e-6,
@@ -51,7 +55,11 @@ NAV = StrapdownSettings(
 
 TACTICAL = replace(
     NAV,
-    noise=Noise(si("0.05 deg/sqrt(h)", "angle random walk"), si("50 ug/sqrt(Hz)", "velocity random walk")),
+    noise=Noise(
+        si("0.05 deg/sqrt(h)", "angle random walk"),
+        si("50 ug/sqrt(Hz)", "velocity random walk"),
+        estimate=TURN_NOISE,
+    ),
     rests=Rests(velocity=2e-4, attitude=si("5 arcsec", "angle")),
     prior=Prior(
         gyro_bias=si("30 deg/h", "rate"),

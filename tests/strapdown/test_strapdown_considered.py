@@ -39,7 +39,7 @@ def test_a_study_that_knows_the_drifts_or_fits_them_has_none_in_u(fitted):
     else:
         prior = replace(faults.SETTINGS.prior, g_sensitivity=1e-3 * PER_G)
         change = {"prior": prior, "given": {"prior": {"g_sensitivity": "0.001 deg/h/g"}}}
-    estimate, _ = faults.estimated(1, {}, {}, change)
+    estimate, _ = faults.estimated(1, {}, {}, change | faults.STILL)
     assert not told(estimate)
     for name in estimate.names:
         assert estimate[name].u == pytest.approx(estimate.result["bounds"][name], rel=1e-3), name

@@ -18,8 +18,10 @@ def result_of(name, seed=0):
 
 
 @pytest.mark.slow
-def test_a_sound_record_of_another_simulator_is_ok_and_met():
-    runs = [result_of("none", seed) for seed in range(3)]
+@pytest.mark.parametrize("name", ["none", "no walk, stated as 0"])
+def test_a_sound_record_of_another_simulator_is_ok_and_met(name):
+    """With walks that the study leaves to the recording u is rather too large: no record excludes small ones."""
+    runs = [result_of(name, seed) for seed in range(3)]
     for estimate, _ in runs:
         assert estimate.status is Status.OK
         assert {each.code for each in estimate.findings} <= {"at_prior", "stated_exact", "considered"}
@@ -31,7 +33,7 @@ def test_a_sound_record_of_another_simulator_is_ok_and_met():
         off = np.array([errors[name] * estimate[name].u for name in estimate.names])
         squares.append(off @ np.linalg.solve(estimate.covariance, off))
     low, high = chi2.ppf([5e-4, 1.0 - 5e-4], z.size)
-    assert low < np.sum(squares) < high
+    assert (0.5 * low if name == "none" else low) < np.sum(squares) < high
 
 
 def named(name, words):

@@ -117,7 +117,7 @@ def live(tmp_path_factory):
     path = tmp_path_factory.mktemp("live")
     settings = ["site.latitude=34 deg", "site.gravity=9.7965(1) m/s^2", "noise.angle_random_walk=5e-4 deg/sqrt(h)",
                 "rests.velocity=0.1 mm/s", "noise.velocity_random_walk=5 ug/sqrt(Hz)", "prior.gyro_bias=1 deg/h",
-                "plan.dwell=5 s",
+                "plan.dwell=5 s", "noise.gyro_walk=0 deg/h/sqrt(s)", "noise.accelerometer_walk=0 ug/sqrt(s)",
                 "plan.first_dwell=20 s", "plan.sample_rate=50 Hz", "truth.r_xx=3 cm",
                 "truth.D_F_y=0.4 deg/h"]  # fmt: skip
     keys = [each for text in settings[:-2] for each in ("--set", text)]

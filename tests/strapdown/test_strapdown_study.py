@@ -7,6 +7,7 @@ import pytest
 from new_studies import filled
 
 from inercal.errors import StudyError
+from inercal.strapdown.settings import ESTIMABLE
 from inercal.studies.load import load_imu_study, load_strapdown_study, load_turntable_study
 from inercal.studies.strapdown import strapdown_study
 from rows import for_each
@@ -29,6 +30,7 @@ def test_the_least_study_and_its_defaults():
     settings = read(LEAST)
     assert settings.noise.angle_random_walk == pytest.approx(np.radians(0.05) / 60.0)
     assert settings.noise.velocity_random_walk == pytest.approx(50e-6 * 9.80665)
+    assert settings.noise.estimate == ESTIMABLE
     assert settings.rests.velocity == pytest.approx(1e-4)
     assert (settings.frame, settings.terms) == ("upper", ("k2", "size", "delay"))
     assert settings.rests.attitude is None
@@ -61,6 +63,7 @@ D_F_y = "1 deg/h"
 """
     )
     assert settings.noise.gyro_walk == pytest.approx(np.radians(1e-3))
+    assert "gyro_walk" not in settings.noise.estimate
     assert settings.rests.attitude == pytest.approx(np.radians(0.01))
     assert settings.rests.list == ((0.0, 10.0), (12.0, 20.0))
     assert settings.start.heading == pytest.approx(np.radians(30.0))

@@ -10,8 +10,10 @@ import inercal as ic
 from inercal.examples import FOLDER
 
 MAP = FOLDER / "xsens-map.toml"
-NOISE = {"angle_random_walk": "1.94 deg/sqrt(h)", "velocity_random_walk": "81 ug/sqrt(Hz)"}
-"""White noise as the first rest has it: standard deviation of its samples, times the root of their interval."""
+NOISE = {"angle_random_walk": "1.94 deg/sqrt(h)", "velocity_random_walk": "81 ug/sqrt(Hz)",
+         "gyro_walk": "0 deg/h/sqrt(s)", "accelerometer_walk": "0 ug/sqrt(s)"}  # fmt: skip
+"""White noise as the first rest has it: standard deviation of its samples, times the root of their interval; biases
+that hold still, as the other program takes them."""
 
 PRIOR = {"gyro_bias": "3 deg/s", "scale": "5 %", "misalignment": "5 deg", "bias": "0.2 g", "k1": "5 %", "axes": "5 deg",
          "g_sensitivity": "2000 deg/h/g"}  # fmt: skip

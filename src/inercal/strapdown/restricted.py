@@ -122,8 +122,7 @@ def _scored(fit: Fit, fixed: Array, parts: Array, s: Array, least: Array) -> tup
 
 
 class Found(NamedTuple):
-    """Noise found from a recording, by how much -2 ln L falls by it (where no walks are among it, which have states of
-    their own), and the fit with it."""
+    """Noise found from a recording, by how much -2 ln L falls by it, and the fit with it."""
 
     noise: Noise
     gain: float
@@ -167,7 +166,6 @@ def _iterated(
     """The noise, of fits and linear problems in turns; raises `numpy.linalg.LinAlgError` where a matrix is singular."""
     noise, deviance = _started(settings.noise, names, LIMITS.walk_start), 0.0
     least = LIMITS.least_noise**2 * variances_of(noise)[[_PLACES[name] for name in names]]
-    before = solved(fitted.chain, fitted.prior).deviance
     for left in reversed(range(LIMITS.noise_rounds)):
         now = replace(settings, noise=noise)
         again = fit(samples, nodes, now, fitted)
@@ -179,7 +177,8 @@ def _iterated(
         if not left or gained < LIMITS.noise_gain:
             break
         noise = _changed(noise, dict(zip(names, np.sqrt(found).tolist(), strict=True)))
-    return Found(noise, before - deviance, fitted)
+    W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", least, parts)))
+    return Found(noise, solved(fitted.chain._replace(W=W), fitted.prior).deviance - deviance, fitted)
 
 
 def with_noise_shown(
@@ -188,30 +187,28 @@ def with_noise_shown(
     """The study with the noise that it leaves to the recording, of which ``estimate`` then names what was found, and
     the fit with that.
 
-    Walks are estimated where the study asks for it; what turns add, where they leave too much, unless an effect outside
-    the model that `left_out` knows, or a prior that cannot be, explains more of it.
+    Walks are estimated where the study states none; what turns add, where they leave too much; unless an effect outside
+    the model that `left_out` finds, or a prior that cannot be, explains more of it.
     """
     asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
-    names = [name for name in WALKS if name in asked]
-    _, turns = residuals(fitted)
-    if turns > LIMITS.turn_excess:
-        names += [name for name in TURN_NOISE if name in asked]
-    found = with_noise(samples, nodes, settings, fitted, tuple(names)) if names else None
-    if found and not found.noise.walks and max(_of_others(fitted, settings)) > found.gain:
-        found = None
-    if found is None:
-        return replace(settings, noise=replace(settings.noise, estimate=())), fitted
-    return replace(settings, noise=replace(found.noise, estimate=tuple(names))), found.fit
+    turns = tuple(name for name in TURN_NOISE if name in asked and residuals(fitted)[1] > LIMITS.turn_excess)
+    walks = tuple(name for name in WALKS if name in asked)
+    settings = replace(settings, noise=replace(settings.noise, estimate=()))
+    for names in (turns, (*walks, *turns) if walks else ()):
+        found = with_noise(samples, nodes, settings, fitted, names) if names else None
+        if found and max(_of_others(fitted, settings)) <= found.gain:
+            settings, fitted = replace(settings, noise=replace(found.noise, estimate=names)), found.fit
+    return settings, fitted
 
 
 def _of_others(fitted: Fit, settings: StrapdownSettings) -> tuple[float, float]:
-    """By how much chi-square falls by the effect outside the model that explains most, and by a wider prior of what
-    lies far outside its own."""
+    """By how much chi-square falls by the effect outside the model that explains most, where that is more than chance,
+    and by a wider prior of what lies far outside its own."""
     named, c = tests(fitted, settings), fitted.c[fitted.free]
     far = np.abs(c) > LIMITS.far_from_prior * fitted.prior
     wider = fitted.chain._replace(prior=np.where(far, 1e-4, 1.0) * fitted.chain.prior)
     by_prior = solved(fitted.chain, fitted.prior).squares - solved(wider, fitted.prior).squares
-    return (named[0].drop if named else 0.0), by_prior
+    return (named[0].drop if named and named[0].significant else 0.0), by_prior
 
 
 def residuals(fitted: Fit) -> tuple[float, float]:

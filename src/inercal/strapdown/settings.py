@@ -68,7 +68,7 @@ class Noise:
     turn_velocity: float = quantity(
         "the same of the velocity", "velocity", 0.0, example="1 cm/s", bounds=_CLOSURE
     )
-    estimate: tuple[str, ...] = TURN_NOISE
+    estimate: tuple[str, ...] = ESTIMABLE
 
     @property
     def walks(self) -> bool:

@@ -16,7 +16,6 @@ from inercal.errors import StudyError
 from inercal.strapdown.coefficients import OPTIONS, names
 from inercal.strapdown.settings import (
     ESTIMABLE,
-    TURN_NOISE,
     Design,
     Goal,
     Motion,
@@ -145,13 +144,13 @@ def _size(dimension: str, example: str) -> QuantityText:
     return QuantityText(dimension, example, lambda size: size >= 0.0, "0 or more, or estimate")
 
 
-def _estimable(says: str, example: str, default: str) -> Any:
-    """The field of such a noise."""
+def _estimable(says: str, example: str) -> Any:
+    """The field of such a noise, which is found from the recording if absent."""
     return Field(
         default=None,
         examples=[example],
         description=f"{says}; estimate finds it from the recording",
-        json_schema_extra={"default": default},
+        json_schema_extra={"default": "estimate"},
     )
 
 
@@ -160,17 +159,16 @@ class NoiseTable(table_of(Noise)):  # type: ignore[misc]
 
     gyro_walk: (
         Literal["estimate"] | Annotated[Quantity, _size("rate random walk", "0.4 deg/h/sqrt(s)")] | None
-    ) = _estimable("random walk of the gyros' biases", "0.4 deg/h/sqrt(s)", "0 deg/h/sqrt(s)")
+    ) = _estimable("random walk of the gyros' biases", "0.4 deg/h/sqrt(s)")
     accelerometer_walk: (
         Literal["estimate"] | Annotated[Quantity, _size("acceleration random walk", "2 ug/sqrt(s)")] | None
-    ) = _estimable("random walk of the accelerometers' biases", "2 ug/sqrt(s)", "0 ug/sqrt(s)")
+    ) = _estimable("random walk of the accelerometers' biases", "2 ug/sqrt(s)")
     turn_attitude: Literal["estimate"] | Annotated[Quantity, _size("angle", "0.02 deg")] | None = _estimable(
         "standard deviation by which the attitude does not close over a turn, beyond the noise of the sensors",
         "0.02 deg",
-        "estimate",
     )
     turn_velocity: Literal["estimate"] | Annotated[Quantity, _size("velocity", "1 cm/s")] | None = _estimable(
-        "the same of the velocity", "1 cm/s", "estimate"
+        "the same of the velocity", "1 cm/s"
     )
 
 
@@ -296,8 +294,7 @@ def _truth(file: StrapdownStudyFile, gravity: float, path: str | Path) -> dict[s
 
 def _noise(table: Any) -> Noise:
     """Noise that is stated, and the names of that which is to be found from the recording."""
-    usual = {name: "estimate" if name in TURN_NOISE else None for name in ESTIMABLE}
-    typed = {name: getattr(table, name) or default for name, default in usual.items()}
+    typed = {name: getattr(table, name) or "estimate" for name in ESTIMABLE}
     sizes = {name: each.value if isinstance(each, Quantity) else 0.0 for name, each in typed.items()}
     return settings_of(
         Noise, table, **sizes, estimate=tuple(name for name, each in typed.items() if each == "estimate")
