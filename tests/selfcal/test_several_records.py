@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent.selfcal import ARCSEC, NOMINAL, PPM, PRIOR, UG, Drive, Faults, study
+from independent.selfcal import ARCSEC, NOMINAL, PPM, PRIOR, UG, Drive, Faults, G, study
 from independent.selfcal_driven import Place, driven
 from scipy.stats import chi2
 
@@ -15,6 +15,7 @@ from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
 from inercal.selfcal.reading import recording_of
+from inercal.selfcal.result.not_fitted import Evidence, of_all
 from inercal.selfcal.several import fit, parts_of, placed
 
 ONE = Drive((("z", 360), ("z", -360)), rate=np.radians(2.0))
@@ -131,6 +132,37 @@ def test_the_command_fits_records_together_and_names_what_changed(tmp_path):
     records[2] = ic.read(tmp_path / names[2])
     apart = fit(parts_of(records, [placed(record, study_) for record in records])).apart
     assert apart.startswith("the records contradict each other")
+
+
+def test_errors_of_the_rig_that_no_state_has_are_in_u_of_a_common_fit(tmp_path):
+    """K2 of 10 ug/g^2 is the same in all records: more than 4 u off by noise and prior, within 4 u as stated, told, and
+    no larger part of u than in a record alone, of which the others know nothing."""
+    names, rng = [f"r{k}.csv" for k in range(3)], np.random.default_rng(11)
+    asked = of_study(tmp_path, names, PLACES[:3])
+    truth, of_rig = drawn(rng)
+    of_rig = replace(of_rig, k2=10e-6 / G * np.array([1.0, -1.0, 1.0]))
+    together = ic.calibrate(made(tmp_path, rng, truth, of_rig, PLACES[:3]), asked).estimate
+    (line,) = (each for each in together.budget if each.source == "errors of the rig that are not fitted")
+    off = np.abs(together.values[:18] - truth)
+    bound = [together.result["bounds"][name] for name in together.names[:18]]
+    assert (off / bound).max() > 4.0
+    assert (off / together.u[:18]).max() < 4.0
+    assert max(line.share.values()) > 0.5
+    assert "K2_" in next(
+        each.message for each in together.findings if each.code == "considered" and not each.where
+    )
+
+
+def test_evidence_of_several_recordings_adds_where_errors_are_the_same():
+    """Two recordings of one K2, and of a bias that wanders in each by itself: score and information of the one add,
+    those of the others stay apart, and so do the shifts."""
+    one = Evidence(("k2", "accelerometer_walk"), ("K2_x", "ka0_T1_x"), np.array([2.0, 3.0]), np.array([1.0, 5.0]),
+                   np.array([[4.0, 0.5], [0.5, 9.0]]), np.array([[0.1, 0.2], [0.3, 0.4]]))  # fmt: skip
+    both = of_all([one, one])
+    assert both.names == ("K2_x", "ka0_T1_x", "ka0_T1_x")
+    assert both.score == pytest.approx([2.0, 5.0, 5.0])
+    assert both.information == pytest.approx(np.array([[8.0, 0.5, 0.5], [0.5, 9.0, 0.0], [0.5, 0.0, 9.0]]))
+    assert both.shift == pytest.approx(np.array([[0.2, 0.2, 0.2], [0.6, 0.4, 0.4]]))
 
 
 def test_a_record_that_is_not_named_is_refused(tmp_path):

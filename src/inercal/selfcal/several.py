@@ -32,7 +32,7 @@ from inercal.estimate.identifiability import UNSEEN
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import shown_unit
-from inercal.records.places import counted
+from inercal.records.places import counted as so_many
 from inercal.records.record import Record
 from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.before.observability import Observability, observability
@@ -44,6 +44,7 @@ from inercal.selfcal.platform.coefficients import NAMES, product_slope, to_produ
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import ALL, KIND_OF, UNIT_OF, WALK
 from inercal.selfcal.result.budget import considered, systematic
+from inercal.selfcal.result.not_fitted import Evidence, counted, evidence, of_all
 from inercal.selfcal.result.outcome import COMMAND, MODEL, REFERENCES
 from inercal.selfcal.settings import SelfcalSettings
 from inercal.selfcal.still_joints import still_joints, told_apart
@@ -229,10 +230,16 @@ def _assembled(
         P = slope @ fit.covariance @ said.information @ fit.covariance @ slope.T
         sources.append(TypeA(f"noise of {part.name}", 1.0, "1", 0.5 * (P + P.T), own))
     sources.append(TypeB("prior", 1.0, "1", slope @ fit.covariance / fit.prior))
-    stated, exact = _stated(parts, fit, u, slope)
-    uncertainty = combine(fit.names, [*sources, *stated])
-    judged = observability(PathBounds(fit.names, by_records, fit.prior, np.empty((0, len(u)))), settings.goal)
+    stated, exact, left = _besides(parts, fit, u, slope)
+    sources += stated
     findings = list[Finding]()
+    if left:
+        rest = counted(of_all(left), slope, fit.names, combine(fit.names, sources).u)
+        sources.append(rest.source)
+        exact = {kind: text for kind, text in exact.items() if kind not in rest.counted}
+        findings += [rest.finding] if rest.finding else []
+    uncertainty = combine(fit.names, sources)
+    judged = observability(PathBounds(fit.names, by_records, fit.prior, np.empty((0, len(u)))), settings.goal)
     for part, each in zip(parts, alone, strict=True):
         told = (f for f in each.estimate.findings if f.code not in _OF_ONE)
         findings += [replace(f, message=f"{part.name}: {f.message}") for f in told]
@@ -294,11 +301,14 @@ def _assembled(
     )
 
 
-def _stated(parts: Sequence[Part], fit: Fit, u: Array, slope: Array) -> tuple[list[TypeB], dict[str, str]]:
+def _besides(
+    parts: Sequence[Part], fit: Fit, u: Array, slope: Array
+) -> tuple[list[TypeB], dict[str, str], list[Evidence]]:
     """Inputs of site, base and rig that are stated with an uncertainty: those of site and rig are the same in all
-    records, heading and tilt another in each; and, in words, what is stated without one."""
+    records, heading and tilt another in each; in words, what is stated without one; and of each record what it says of
+    errors of the rig that are no states."""
     whole = dict[str, tuple[TypeB, Array]]()
-    exact = dict[str, str]()
+    exact, left = dict[str, str](), list[Evidence]()
     for part in parts:
         own = filtering.estimate(part.recording, part.problem, courses=False)
         known = np.sqrt(np.diag(own.covariance))
@@ -314,7 +324,10 @@ def _stated(parts: Sequence[Part], fit: Fit, u: Array, slope: Array) -> tuple[li
             shift = slope @ weight @ (back @ each.sensitivity)[fit.common]
             before = whole[name][1] if name in whole else np.zeros(len(u))
             whole[name] = each, before + shift
-    return [replace(each, source=name, sensitivity=shift) for name, (each, shift) in whole.items()], exact
+        if (found := evidence(part.recording, part.settings, own)) is not None:
+            left.append(found._replace(shift=weight @ found.shift[fit.common]))
+    named = [replace(each, source=name, sensitivity=shift) for name, (each, shift) in whole.items()]
+    return named, exact, left
 
 
 def _entry(part: Part, alone: Calibration) -> dict[str, Any]:
@@ -355,5 +368,5 @@ def _verdict(
     rows = sum(len(part.recording.t) - 1 for part in parts)
     return (
         Status.OK,
-        f"{counted(len(judged.learned.names), 'coefficient')} from {len(parts)} records, {rows} rows",
+        f"{so_many(len(judged.learned.names), 'coefficient')} from {len(parts)} records, {rows} rows",
     )

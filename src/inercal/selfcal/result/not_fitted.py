@@ -68,11 +68,32 @@ class _Effects(NamedTuple):
     shift: Array
 
 
+class Evidence(NamedTuple):
+    """What recordings say of errors: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual`` (q,)
+    sizes [SI]; of each per usual size its ``score`` (q,), ``information`` (q, q) and the change of the coefficients,
+    linear form, ``shift`` (p, q)."""
+
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    usual: Array
+    score: Array
+    information: Array
+    shift: Array
+
+
 def not_fitted(
     recording: Recording, settings: SelfcalSettings, result: FilterResult, u: Array
 ) -> NotFitted | None:
     """Errors that are not fitted by the ``result`` of a filter, whose coefficients have ``u`` (p,) without them; None
     where the states are not those of a rig, or where no error is left."""
+    found = evidence(recording, settings, result)
+    if found is None:
+        return None
+    return counted(found, product_slope(result.coefficients), result.names, u)
+
+
+def evidence(recording: Recording, settings: SelfcalSettings, result: FilterResult) -> Evidence | None:
+    """What a recording says of errors that are not fitted by the ``result`` of a filter; None as in `not_fitted`."""
     if not {*RIG} <= {*settings.kinds}:
         return None
     case = averaged(recording, problem(settings), result)
@@ -84,23 +105,55 @@ def not_fitted(
     ]
     if not parts:
         return None
-    found = _Effects(
+    z, columns = regular(case[0], now), np.concatenate([each.innovations for each in parts], axis=1)
+    return Evidence(
         tuple(kind for each in parts for kind in each.kinds),
         tuple(name for each in parts for name in each.names),
         np.concatenate([each.usual for each in parts]),
-        np.concatenate([each.innovations for each in parts], axis=1),
+        columns.T @ z[np.isfinite(z)],
+        columns.T @ columns,
         np.concatenate([each.shift for each in parts], axis=1),
     )
-    counted = tuple(dict.fromkeys(found.kinds))
-    z, columns = regular(case[0], now), found.innovations
-    kinds = np.array([counted.index(kind) for kind in found.kinds])
-    moment = joint_second_moment(columns.T @ z[np.isfinite(z)], columns.T @ columns, kinds)
+
+
+def of_all(each: Sequence[Evidence]) -> Evidence:
+    """The evidence of several recordings, of which each has its part of the ``shift`` of the coefficients: what does
+    not change with time is the same in all of them, what wanders is another in each. The information is less than what
+    their fit has, for which the coefficients too are the same."""
+    places = dict[tuple[int, int, str], int]()
+    where = []
+    for number, one in enumerate(each):
+        own = [
+            (number, k, name) if kind in BIAS_WALK else (-1, -1, name)
+            for k, (kind, name) in enumerate(zip(one.kinds, one.names, strict=True))
+        ]
+        where.append(np.array([places.setdefault(key, len(places)) for key in own]))
+    q = len(places)
+    kinds, names, usual = [""] * q, [""] * q, np.zeros(q)
+    score, information, shift = np.zeros(q), np.zeros((q, q)), np.zeros((len(each[0].shift), q))
+    for one, at in zip(each, where, strict=True):
+        for place, kind, name in zip(at.tolist(), one.kinds, one.names, strict=True):
+            kinds[place], names[place] = kind, name
+        usual[at] = one.usual
+        score[at] += one.score
+        information[np.ix_(at, at)] += one.information
+        shift[:, at] += one.shift
+    return Evidence(tuple(kinds), tuple(names), usual, score, information, shift)
+
+
+def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> NotFitted:
+    """What the errors add to coefficients of these ``names`` (p,), with their ``slope`` (p, p) by the linear form and
+    ``u`` (p,) without."""
+    kinds = tuple(dict.fromkeys(found.kinds))
+    moment = joint_second_moment(
+        found.score, found.information, np.array([kinds.index(kind) for kind in found.kinds])
+    )
     eigenvalues, axes = np.linalg.eigh(moment)
-    shift = product_slope(result.coefficients) @ found.shift
+    shift = slope @ found.shift
     source = TypeB(SOURCE, 1.0, "1", shift @ axes * np.sqrt(np.maximum(eigenvalues, 0.0)))
     left = np.sqrt(np.diag(moment))
     raised, told = np.zeros(len(u), dtype=bool), list[str]()
-    for kind in counted:
+    for kind in kinds:
         own = np.array([each == kind for each in found.kinds])
         more = np.sqrt(
             np.maximum(np.einsum("ia,ab,ib->i", shift[:, own], moment[np.ix_(own, own)], shift[:, own]), 0.0)
@@ -108,9 +161,9 @@ def not_fitted(
         if (more > LIMITS.considered_part * u).any():
             raised |= more > LIMITS.considered_part * u
             told.append(_words(kind, found, own, left))
-    names = [name for name, by in zip(result.names, raised.tolist(), strict=True) if by]
-    walks = ("bias_walk",) if {*BIAS_WALK} & {*counted} else ()
-    return NotFitted((*counted, *walks), source, _told(told, names) if names else None)
+    these = [name for name, by in zip(names, raised.tolist(), strict=True) if by]
+    walks = ("bias_walk",) if {*BIAS_WALK} & {*kinds} else ()
+    return NotFitted((*kinds, *walks), source, _told(told, these) if these else None)
 
 
 def _constant(case: Case, now: FilterResult, settings: SelfcalSettings) -> _Effects:
@@ -157,7 +210,7 @@ def _of_names(
     return _Effects(tuple(kinds), tuple(names), usual, innovations[there] * usual, shift * usual)
 
 
-def _words(kind: str, found: _Effects, own: Array, left: Array) -> str:
+def _words(kind: str, found: Evidence, own: Array, left: Array) -> str:
     """The largest error that is left of a kind, in words."""
     worst = int(np.flatnonzero(own)[np.argmax(left[own])])
     name = found.names[worst]
