@@ -79,16 +79,25 @@ class Layout:
 _ROUNDING = 1e-12
 
 
+@lru_cache(maxsize=64)
 def axes(layout: Layout, level: float = 1.0) -> Array:
     """(N, 2): coefficients by which each axis reads (sin theta, cos theta) at rest, over g."""
-    return np.stack([np.cos(layout.angle), -level * np.sin(layout.angle)], axis=-1)
+    return _kept(np.stack([np.cos(layout.angle), -level * np.sin(layout.angle)], axis=-1))
 
 
+@lru_cache(maxsize=64)
+def inverse_axes(layout: Layout, level: float = 1.0) -> Array:
+    """(2, N): pseudo-inverse of `axes`."""
+    return _kept(np.asarray(np.linalg.pinv(axes(layout, level)), dtype=np.float64))
+
+
+@lru_cache(maxsize=64)
 def centrifugal_arms(layout: Layout, level: float = 1.0) -> Array:
     """(N,) q [m]: each axis reads -q w^2."""
     return _arms(layout.r * np.cos(layout.angle) - level**2 * layout.z * np.sin(layout.angle))
 
 
+@lru_cache(maxsize=64)
 def tangential_arms(layout: Layout, level: float = 1.0) -> Array:
     """(N,) p [m]: each axis reads p al."""
     return _arms(-level * (layout.z * np.cos(layout.angle) + layout.r * np.sin(layout.angle)))
@@ -96,7 +105,13 @@ def tangential_arms(layout: Layout, level: float = 1.0) -> Array:
 
 def _arms(length: Array) -> Array:
     """Arms, 0 where they are only rounding: such an axis needs no gyro."""
-    return np.where(np.abs(length) < _ROUNDING, 0.0, length)
+    return _kept(np.where(np.abs(length) < _ROUNDING, 0.0, length))
+
+
+def _kept(array: Array) -> Array:
+    """An array that is handed out again and again: nobody may change it."""
+    array.flags.writeable = False
+    return array
 
 
 @lru_cache(maxsize=64)
@@ -124,6 +139,7 @@ def pair_weights(layout: Layout, level: float = 1.0) -> Array | None:
     return np.asarray(weights / (weights @ p))
 
 
+@lru_cache(maxsize=64)
 def all_weights(layout: Layout) -> Array | None:
     """(N,) d [1/m] for the angular acceleration d . A by least squares from all axes; None where they do not show it.
 
@@ -133,4 +149,4 @@ def all_weights(layout: Layout) -> Array | None:
     p, of_gravity = tangential_arms(layout), axes(layout)
     beside = p - of_gravity @ np.linalg.lstsq(of_gravity, p, rcond=None)[0]
     power = float(beside @ beside)
-    return beside / power if power > LIMITS.pair_arm**2 else None
+    return _kept(beside / power) if power > LIMITS.pair_arm**2 else None

@@ -13,12 +13,13 @@ rate through compensation as 2 q w e.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
 from inercal.aoa.layout import Layout, all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.paper.static import Errors
-from inercal.aoa.settings import AoaSettings, Tangential
+from inercal.aoa.settings import AoaSettings, Noise, Prior, Tangential
 from inercal.arrays import Array
 
 DECISION = 2.0 + math.sqrt(6.0)
@@ -128,7 +129,38 @@ def error_terms(
     to the readings; elsewhere, 0, the term counts as an error of its own size, as does p al where it was left in.
     ``step`` [s] is the interval of the gyro's samples, for their differences.
     """
-    prior, noise, n = settings.prior, settings.noise, len(layout.names)
+    noise = settings.noise
+    qq, pp, cross, ww, wa, aa, always, doubt = _matrices(
+        settings.prior, noise, layout, level, step if tangential == "differentiated" else math.inf
+    )
+    w2, gyro = rate**2, noise.gyro**2 / level**2
+    both = gyro + noise.gyro_bias**2 / level**2
+    prior = settings.prior
+    errors: list[tuple[Array | float, Array]] = [
+        (1.0, always),
+        (w2 * compensated, 4.0 * both * qq),
+        (w2 * w2 * compensated, 4.0 * prior.gyro_scale**2 * qq),
+        (w2 * w2 * (1.0 - compensated), qq),
+        (w2 * w2, ww),
+        (w2 * acceleration, wa),
+        (acceleration**2 + doubt, aa),
+    ]
+    if tangential == "none" and (weights := all_weights(layout)) is not None:
+        of_noise = (noise.accelerometer / level) ** 2 * float(weights @ weights)
+        errors.append((np.maximum(acceleration**2 - of_noise, 0.0), pp))
+    if tangential == "differentiated":
+        errors.append((rate * compensated, -2.0 * gyro / step * cross))
+    return [(weight, matrix) for weight, matrix in errors if matrix.any()]
+
+
+@lru_cache(maxsize=64)
+def _matrices(
+    prior: Prior, noise: Noise, layout: Layout, level: float, step: float
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, float]:
+    """What the terms of `error_terms` are made of, which rows share: outer products of the arms q and p with themselves
+    and each other, of errors of places with the squares and the product of rate and acceleration, and that which is
+    always there, with the doubt of a rate that is differentiated over the ``step`` [s], infinite where none is."""
+    n = len(layout.names)
     q, p = centrifugal_arms(layout, level), tangential_arms(layout, level)
     cosine, sine = np.cos(layout.angle), np.sin(layout.angle)
     of_r = prior.lever_common**2 + prior.lever**2 * np.eye(n)
@@ -138,27 +170,10 @@ def error_terms(
     ww = r_w @ of_r @ r_w + z_w @ of_z @ z_w
     wa = r_w @ of_r @ r_al + z_w @ of_z @ z_al
     aa = r_al @ of_r @ r_al + z_al @ of_z @ z_al
-    w2, gyro = rate**2, noise.gyro**2 / level**2
-    both = gyro + noise.gyro_bias**2 / level**2
-    qq = np.outer(q, q)
     half = 0.5 * noise.accelerometer_bias**2  # of the biases is common
     always, doubt = (noise.accelerometer**2 + half) * np.eye(n) + half, 0.0
-    if tangential == "differentiated":
-        doubt = 2.0 * gyro / step**2
-        always = always + doubt * np.outer(p, p)
-    errors: list[tuple[Array | float, Array]] = [
-        (1.0, always),
-        (w2 * compensated, 4.0 * both * qq),
-        (w2 * w2 * compensated, 4.0 * prior.gyro_scale**2 * qq),
-        (w2 * w2 * (1.0 - compensated), qq),
-        (w2 * w2, ww),
-        (w2 * acceleration, wa + wa.T),
-        (acceleration**2 + doubt, aa),
-    ]
-    if tangential == "none" and (weights := all_weights(layout)) is not None:
-        of_noise = (noise.accelerometer / level) ** 2 * float(weights @ weights)
-        errors.append((np.maximum(acceleration**2 - of_noise, 0.0), np.outer(p, p)))
-    if tangential == "differentiated":
-        cross = np.outer(q, p)
-        errors.append((rate * compensated, -2.0 * gyro / step * (cross + cross.T)))
-    return [(weight, matrix) for weight, matrix in errors if matrix.any()]
+    pp, cross = np.outer(p, p), np.outer(q, p)
+    if math.isfinite(step):
+        doubt = 2.0 * (noise.gyro**2 / level**2) / step**2
+        always = always + doubt * pp
+    return np.outer(q, q), pp, cross + cross.T, ww, wa + wa.T, aa, always, doubt

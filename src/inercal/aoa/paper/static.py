@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.aoa.layout import Layout, axes
+from inercal.aoa.layout import Layout, axes, inverse_axes
 from inercal.aoa.settings import Static
 from inercal.arrays import Array
 from inercal.errors import StudyError
@@ -73,7 +73,7 @@ def segmented(acc: Array, layout: Layout, gravity: float, level: float = 1.0) ->
     of `gls`.
     """
     h = _axes(layout, level)
-    coarse = _direction(acc @ np.linalg.pinv(h).T)
+    coarse = _direction(acc @ inverse_axes(layout, level).T)
     slope = _slopes(coarse, h)
     i = np.argmax(np.where(slope < 0.0, -_BACKWARD * slope, slope), axis=1)
     at = np.arange(len(acc)), i
@@ -104,7 +104,7 @@ def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> 
     and what is raised as of `gls`.
     """
     pairs = _pairs(layout, level, "improved")
-    coarse = acc @ np.linalg.pinv(_axes(layout, level)).T
+    coarse = acc @ inverse_axes(layout, level).T
     alike = pairs.sum(axis=2)
     suffering = np.abs(coarse[:, 1:] * alike[:, 0] - coarse[:, :1] * alike[:, 1])
     rank = _LATER * gravity * np.arange(len(pairs))
@@ -151,7 +151,7 @@ def gls(
         covariance = np.eye(len(h))
     weight = np.linalg.pinv(covariance / np.trace(covariance), rcond=_NO_WEIGHT, hermitian=True)
     read = acc / gravity
-    force = acc @ np.linalg.pinv(h).T
+    force = acc @ inverse_axes(layout, level).T
     theta = np.arctan2(force[:, 0], force[:, 1])
     for _ in range(_ROUNDS):
         direction = np.stack([np.sin(theta), np.cos(theta)], axis=-1)

@@ -58,6 +58,10 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     return tuple(inputs)
 
 
+_FEW = 1000
+"""Rows below which a thread costs more than it spares: a stream asks for one row at a time."""
+
+
 def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
     """The problem of the fusion under a change, which also moves the coefficients of an earlier run."""
     constants = problem.constants._replace(gravity=float(lean.gravity), roll_cosine=math.cos(lean.roll))
@@ -124,6 +128,8 @@ def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Ar
     changes = leans(settings, angles.roll is not None)
     if not changes:
         return angles
+    if len(angles.theta) < _FEW:
+        return widened(angles, settings, changes, list(map(run, changes)))
     with ThreadPoolExecutor() as pool:
         return widened(angles, settings, changes, list(pool.map(run, changes)))
 
