@@ -49,8 +49,8 @@ def rows(quick: bool) -> list[Row]:
             bench.close()
 
 
-def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
-    """A recording of six channels at 1 kHz, with a rest every minute: read and drawn, then zoomed."""
+def recording(count: int) -> dict[str, np.ndarray]:
+    """Channels of an IMU at 1 kHz, with a rest every minute."""
     rng = np.random.default_rng(1)
     t = np.arange(count) / 1000.0
     moving = (t % 60.0) > 40.0
@@ -59,6 +59,12 @@ def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
         for axis in "xyz":
             noise = rng.standard_normal(count, dtype=np.float32).astype(float)
             channels[f"{sensor}_{axis} [{unit}]"] = 0.01 * noise + moving * np.sin(3.0 * t)
+    return channels
+
+
+def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
+    """A recording of six channels: read and drawn, then zoomed."""
+    channels = recording(count)
     session = bench.sessions.begin("long")
     np.savez(session.folder / "long.npz", **channels)
     size = f"{count:,} rows".replace(",", " ")
@@ -70,7 +76,8 @@ def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
     def zoom(begin: float, end: float) -> int:
         return len(orjson.dumps(figure(held.courses, (begin, end), held.notes)))
 
-    whole, middle = float(t[-1]), 0.4 * float(t[-1])
+    whole = float(channels["t [s]"][-1])
+    middle = 0.4 * whole
     works = {
         "zoom: the whole": lambda: zoom(0.0, whole),
         "zoom: a tenth": lambda: zoom(middle, middle + 0.1 * whole),

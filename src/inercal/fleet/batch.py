@@ -11,7 +11,7 @@ from pathlib import Path
 from inercal._files import write_text
 from inercal.errors import InputError, MissingExtraError
 from inercal.estimate.basis import Basis, provenance
-from inercal.estimate.cluster import ChunkLostError, place
+from inercal.estimate.cluster import ChunkLostError, Cluster, place
 from inercal.estimate.executors import Executor, Processes
 from inercal.estimate.files import save
 from inercal.estimate.result import Estimate
@@ -118,6 +118,9 @@ def batch(
     return Result(estimate, view, found)
 
 
+_AT_ONCE = 8
+"""Units that a worker of a cluster is given at once at most, for its scheduler takes some milliseconds each time."""
+
 _NAMES = ("units.csv", "units.parquet", "fleet.html", "fleet.json")
 """Files of a fleet in its folder, beside those of the units."""
 
@@ -150,8 +153,10 @@ def _rows(
     done: dict[int, Row] = {}
     progress(0, len(units))
 
+    size = max(1, min(_AT_ONCE, len(units) // (32 * workers))) if isinstance(executor, Cluster) else 1
+
     def take(numbers: Sequence[int], place: Executor) -> None:
-        with closing(place.map(work, [range(n, n + 1) for n in numbers])) as finished:
+        with closing(place.map(work, _chunks(numbers, size))) as finished:
             for _, rows in finished:
                 done.update(rows)
                 progress(len(done), len(units))
@@ -168,6 +173,17 @@ def _rows(
                 except BrokenExecutor:
                     done[number] = _ended(work, units[number])
     return [done[n] for n in range(len(units))]
+
+
+def _chunks(numbers: Sequence[int], size: int) -> list[range]:
+    """Increasing numbers in ranges of at most so many."""
+    chunks: list[range] = []
+    for n in numbers:
+        if chunks and n == chunks[-1].stop and len(chunks[-1]) < size:
+            chunks[-1] = range(chunks[-1].start, n + 1)
+        else:
+            chunks.append(range(n, n + 1))
+    return chunks
 
 
 def _ended(work: Batch, unit: Unit) -> Row:

@@ -51,8 +51,7 @@ def add(bench: Bench) -> None:
                 return
             _verdict(bench, session, result)
             _residuals(session, result)
-            if job.report is not None:
-                report(job, "report")
+            place = ui.element("div").classes("w-full")
             _coefficients(result)
             _budget(result)
             heading("Take it along")
@@ -67,6 +66,10 @@ def add(bench: Bench) -> None:
             _certificate(bench, job)
             heading("The same from the command line")
             command(job.command)
+        if job.report is not None:
+            await ui.context.client.connected()  # a page does not wait for its report
+            with place:
+                report(job, "report")
 
 
 _BY_TURNS = "inercal calibrate strapdown"
