@@ -3,8 +3,8 @@
     python benchmarks/workbench_browser.py [--quick]
 
 By the clock on the wall, in the system's Chromium without a screen or a graphics processor, browser and workbench on
-the same two processors. A page shows when its heading is painted, by the browser's own clock from the begin of navigation;
-`load` is its own event. A zoom is from the gesture until the picture holds the new samples and is painted.
+the same two processors. A page shows when its heading is painted, by the browser's own clock from the begin of
+navigation; `load` is its own event. A zoom is from the gesture until the picture holds the new samples and is painted.
 """
 
 import os

@@ -114,7 +114,8 @@ def test_turns_about_one_axis_do_not_show_the_others(folder, capsys):
 def test_more_noise_than_stated_is_inconsistent(folder, capsys):
     capsys.readouterr()
     stated = ("noise.angle_random_walk=0.005 deg/sqrt(h)", "noise.velocity_random_walk=5 ug/sqrt(Hz)",
-              "rests.velocity=0.02 mm/s", "noise.gyro_walk=0 deg/h/sqrt(s)", "noise.accelerometer_walk=0 ug/sqrt(s)")  # fmt: skip
+              "rests.velocity=0.02 mm/s", "noise.gyro_walk=0 deg/h/sqrt(s)",
+              "noise.accelerometer_walk=0 ug/sqrt(s)")  # fmt: skip
     assert calibrate(*(each for key in stated for each in ("--set", key))) == 1
     assert "inconsistent: the recording contradicts model or noise" in capsys.readouterr().out
 
