@@ -55,7 +55,9 @@ def main() -> None:
     for grade in options.grade or GRADES:
         for study in studies(GRADES[grade]):
             about = {"strapdown": grade, "study": study, "seed": options.seed}
-            runs = answers(Calibration(grade, study, options.seed), options.runs, options, about)
+            own = argparse.Namespace(**vars(options))
+            own.checkpoint = options.checkpoint and options.checkpoint / f"{grade}-{study}"
+            runs = answers(Calibration(grade, study, options.seed), options.runs, own, about)
             print(f"| {grade}, {study} | {row(runs)} |", flush=True)
 
 
