@@ -36,7 +36,7 @@ def as_shown(settings, c, rng):
     nodes = nodes_of(samples, found_rests(samples, settings.rests), settings.rests.node)
     noise = replace(settings.noise, gyro_walk=0.0, accelerometer_walk=0.0, estimate=ESTIMABLE)
     without = replace(settings, noise=noise)
-    shown, found = with_noise_shown(samples, nodes, without, fit(samples, nodes, without))
+    shown, found, _ = with_noise_shown(samples, nodes, without, fit(samples, nodes, without))
     more = (
         opened(found, samples, shown) if shown.noise.estimate else 0.0
     )  # chance may look like another effect

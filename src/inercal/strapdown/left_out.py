@@ -63,6 +63,10 @@ class Tested(NamedTuple):
         return np.asarray(self.moved @ np.linalg.inv(np.linalg.cholesky(self.information)).T)
 
 
+DRIFT = "bias_drift"
+"""Code of biases that drift in proportion to time."""
+
+
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
     """Effects that a fit may have left out."""
     G, prior = fit.sensitivities, settings.deviations()
@@ -87,7 +91,7 @@ def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
         if walk == 0.0:
             yield Candidate(
                 f"{sensor}_ramp",
-                "bias_drift",
+                DRIFT,
                 f"biases of the {sensor}s that drift over the recording",
                 f"let the unit warm up, or state noise.{sensor}_walk",
                 part[:, None, None] * G[:, :, at],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -62,10 +62,12 @@ def assemble(
     rests: tuple[Dwell, ...],
     fit: Fit,
     settings: StrapdownSettings,
+    ramps: Sequence[Tested] = (),
     by_filter: Filtered | None = None,
 ) -> Estimate:
     """Put the estimate together; of the filter, where there is one, in the place of the batch's coefficients: the
-    residuals of turns and the budget stay those of the batch."""
+    residuals of turns and the budget stay those of the batch. ``ramps`` are the drifts of biases that the recording
+    shows where these do not walk."""
     batch = fit
     if by_filter is not None:
         fit = replace(fit, c=by_filter.c, passes=by_filter.passes, converged=by_filter.converged)
@@ -108,6 +110,7 @@ def assemble(
         findings.append(Finding("stated_exact", text))
     findings += _too_quiet(fit)
     findings += _left_out(tested, found, J, fitted_u)
+    findings += [each for ramp in ramps if (each := _shown(ramp, found, J, fitted_u)).harm]
     findings += [drifts.finding] if drifts and drifts.finding else []
     findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
     findings += _turn_noise(settings, left)
@@ -320,13 +323,17 @@ def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Arr
             if each.candidate.name in USUAL
             and (harm := _beyond(found, np.linalg.norm(slope @ each.reach, axis=1), u))
         ]  # fmt: skip
-    best, candidate = tested[0], tested[0].candidate
-    harm = _beyond(found, np.abs(slope @ best.shift), u)
+    return [_shown(tested[0], found, slope, u)]
+
+
+def _shown(best: Tested, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
+    """The finding of an effect that the recording shows; it harms the values that it would shift by more than u."""
+    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), u)
     text = (
         f"the recording shows {candidate.words}: chi-square falls by {best.drop:.4g} for "
         f"{counted(len(candidate.prior), 'parameter')}; {candidate.advice}"
     )
-    return [Finding(candidate.code, text, harm=harm)]
+    return Finding(candidate.code, text, harm=harm)
 
 
 def _beyond(found: tuple[str, ...], shift: Array, u: Array) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from inercal.strapdown.batch import (
     left_over,
     variances_of,
 )
-from inercal.strapdown.left_out import tests
+from inercal.strapdown.left_out import DRIFT, Tested, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples
@@ -181,11 +181,17 @@ def _iterated(
     return Found(noise, solved(fitted.chain._replace(W=W), fitted.prior).deviance - deviance, fitted)
 
 
-def with_noise_shown(
-    samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit
-) -> tuple[StrapdownSettings, Fit]:
-    """The study with the noise that it leaves to the recording, of which ``estimate`` then names what was found, and
-    the fit with that.
+class Shown(NamedTuple):
+    """A study with the noise that it left to the recording, of which ``estimate`` then names what was found, the fit
+    with that, and the ``ramps`` that were shown before biases could walk."""
+
+    settings: StrapdownSettings
+    fit: Fit
+    ramps: tuple[Tested, ...]
+
+
+def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit) -> Shown:
+    """The noise that a recording shows, from a fit without.
 
     Walks are estimated where the study states none; what turns add, where they leave too much; unless an effect outside
     the model that `left_out` finds, or a prior that cannot be, explains more of it.
@@ -193,22 +199,32 @@ def with_noise_shown(
     asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
     turns = tuple(name for name in TURN_NOISE if name in asked and residuals(fitted)[1] > LIMITS.turn_excess)
     walks = tuple(name for name in WALKS if name in asked)
-    settings = replace(settings, noise=replace(settings.noise, estimate=()))
+    shown = Shown(replace(settings, noise=replace(settings.noise, estimate=())), fitted, ())
     for names in (turns, (*walks, *turns) if walks else ()):
-        found = with_noise(samples, nodes, settings, fitted, names) if names else None
-        if found and max(_of_others(fitted, settings)) <= found.gain:
-            settings, fitted = replace(settings, noise=replace(found.noise, estimate=names)), found.fit
-    return settings, fitted
+        found = with_noise(samples, nodes, shown.settings, shown.fit, names) if names else None
+        if not found:
+            continue
+        tested, drifting = tests(shown.fit, shown.settings), found.noise.walks
+        if _of_others(shown.fit, tested, drifting) <= found.gain:
+            ramps = tuple(
+                each for each in tested if drifting and each.significant and each.candidate.code == DRIFT
+            )
+            noise = replace(found.noise, estimate=names)
+            shown = Shown(replace(settings, noise=noise), found.fit, ramps)
+    return shown
 
 
-def _of_others(fitted: Fit, settings: StrapdownSettings) -> tuple[float, float]:
-    """By how much chi-square falls by the effect outside the model that explains most, where that is more than chance,
-    and by a wider prior of what lies far outside its own."""
-    named, c = tests(fitted, settings), fitted.c[fitted.free]
+def _of_others(fitted: Fit, tested: list[Tested], walks: bool) -> float:
+    """By how much chi-square falls by what explains most: an effect outside the model that is more than chance, or a
+    wider prior of what lies far outside its own. A drift of the biases is no other effect where these may walk."""
+    c = fitted.c[fitted.free]
     far = np.abs(c) > LIMITS.far_from_prior * fitted.prior
     wider = fitted.chain._replace(prior=np.where(far, 1e-4, 1.0) * fitted.chain.prior)
     by_prior = solved(fitted.chain, fitted.prior).squares - solved(wider, fitted.prior).squares
-    return (named[0].drop if named and named[0].significant else 0.0), by_prior
+    shown = (
+        each.drop for each in tested if each.significant and not (walks and each.candidate.code == DRIFT)
+    )
+    return max(by_prior, *shown, 0.0)
 
 
 def residuals(fitted: Fit) -> tuple[float, float]:

@@ -76,7 +76,7 @@ def calibrate(
         estimate = useless(record, samples, rests, settings, force)
         return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
     progress("estimating noise")
-    settings, fitted = with_noise_shown(samples, nodes, settings, fitted)
+    settings, fitted, ramps = with_noise_shown(samples, nodes, settings, fitted)
     by_filter = None
     if settings.filter == "error-state":
         progress("filtering")
@@ -85,5 +85,5 @@ def calibrate(
             estimate = failed(record, samples, rests, settings)
             return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)
     progress("assembling")
-    estimate = assemble(record, samples, rests, fitted, settings, by_filter)
+    estimate = assemble(record, samples, rests, fitted, settings, ramps, by_filter)
     return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)
