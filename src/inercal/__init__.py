@@ -53,17 +53,18 @@ Map, lower floors first; each imports only from those above its own line
     keys                       what a study says of a field of settings: key, unit, default, bounds, meaning
     geometry                   rotations, earth, site
     instruments                terms, triad, polynomial, by_angle, noise
-    records                    record, column, clocks, made, channels, maps, read, write, checks, dwells
+    records                    record, column, channels, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
-    estimate                   result, budget, linear, nonlinear, runs, coverage, files, repeat, compare,
+    estimate                   result, budget, runs, coverage, files, repeat, compare, effects,
                                checkpoint, consistency, identifiability, hypotheses; kernels: factor, sigma_point,
                                kalman
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
     designs                    candidates, criteria, exchange, comparison
-    imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, temperature, task
-    strapdown                  coefficients, kernels, samples, rests, batch, bounds, design, simulate,
-                               task
+    imu                        multiposition (poses, accelerometer, turns, gyro), means, known_rates, known_turns,
+                               ferraris, aided, temperature, task
+    strapdown                  coefficients, kernels, samples, rests, batch, error_state, restricted, averaged,
+                               left_out, considered, bounds, design, simulate, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     selfcal                    platform (rig, plan, model), filters (error_state, multiplicative, quaternion,
                                gimbal, batch), before (bounds, observability, path_design,

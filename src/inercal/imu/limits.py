@@ -64,7 +64,7 @@ class Limits:
 
     condition: float = 50.0
     """Condition number of the scaled Jacobian beyond which a combination of terms counts as weakly known; sound tests
-    have 1 to 20."""
+    have 2 to 20."""
 
     ordinary_clock: float = 50e-6
     """Relative error that the clock of a recorder has as a rule."""
@@ -78,7 +78,7 @@ class Limits:
     """Poses that a fit with K2 needs."""
 
     ordinary_k2: float = 150e-6 / STANDARD_GRAVITY
-    """Standard deviation [1/(m/s^2)] of second-order coefficients that are neither fitted nor stated, 100 ug/g^2, as
+    """Standard deviation [1/(m/s^2)] of second-order coefficients that are neither fitted nor stated, 150 ug/g^2, as
     consumer-grade sensors have them."""
 
     fine_k2: float = 30e-6 / STANDARD_GRAVITY
