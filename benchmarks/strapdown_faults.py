@@ -84,7 +84,9 @@ def estimated(seed, fault, changes, study):
     site = replace(SETTINGS.site, latitude=strapdown.LATITUDE + study.pop("wrong", 0.0))
     estimate = calibrate(record_of(columns, t), replace(SETTINGS, site=site, **study)).estimate
     truth = made.truth()
-    truth["tau_a"] -= fault.get("low_pass", 0.0)  # gyros that lag are accelerometers that lead
+    truth["tau_a"] -= strapdown.lag(
+        fault.get("low_pass", 0.0), TEST
+    )  # gyros that lag are accelerometers that lead
     return estimate, {
         name: (estimate[name].value - truth[name]) / estimate[name].u for name in estimate.names
     }

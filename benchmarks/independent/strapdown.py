@@ -103,6 +103,13 @@ class Test:
     wobble: float = 0.15
 
 
+def lag(time, test):
+    """Delay [s] of slow rates by a filter of that time constant, in steps as it is made here; 0 without one."""
+    h = 1.0 / (test.rate * STEPS)
+    left = np.exp(-h / time) if time else 0.0
+    return h * left / (1.0 - left)
+
+
 def rotation(v):
     """Rotation matrix of a rotation vector (3,)."""
     a = float(np.sqrt(v @ v))

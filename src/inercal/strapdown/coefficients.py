@@ -6,8 +6,8 @@ W = [w'x] + [wx][wx] and the accelerometers late by tau:
     y_a = (1 + Ka) fs + K2' fs^2 + K0        1 + Ka = K1 M,  K2' = K1 K2
     y_g = (1 + Kg) w + A' |w| + G f + D_F    1 + Kg = S T,   A' = S S_asym / 2
 
-Estimation works on the array (51,) of all coefficients, which is linear in the outputs but for fs^2. It keeps to the frame
-``upper``: z along the input axis of accelerometer z, y in the plane of those of y and z, so that Ka is upper
+Estimation works on the array (51,) of all coefficients, which is linear in the outputs but for fs^2. It keeps to the
+frame ``upper``: z along the input axis of accelerometer z, y in the plane of those of y and z, so that Ka is upper
 triangular. Results are in the stated form of `stated`, in that frame or in ``lower``: x along the input axis of
 accelerometer x, y in the plane of those of x and y. Both frames have their origin at accelerometer z, r_z = 0.
 """

@@ -41,16 +41,22 @@ class Candidate(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """A candidate, by how much chi-square falls when it is freed, and whether that is more than chance; by how much
-    each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the coefficients of the fit; in the
-    same units the ``score`` (q,) of the parameters and their ``information`` (q, q), that of the prior with it."""
+    """A candidate, by how much chi-square falls when it is freed, and the ``limit`` beyond which that is more than
+    chance; by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the
+    coefficients of the fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q),
+    that of the prior with it."""
 
     candidate: Candidate
     drop: float
-    significant: bool
+    limit: float
     moved: Array
     score: Array
     information: Array
+
+    @property
+    def significant(self) -> bool:
+        """True where it is no chance."""
+        return self.drop > self.limit
 
     @property
     def shift(self) -> Array:
@@ -131,5 +137,5 @@ def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
         drop = float(score @ np.linalg.solve(left, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(tried)))
         moved = -fit.prior[:, None] * by
-        done.append(Tested(each, drop, drop > limit, moved, score, left))
+        done.append(Tested(each, drop, limit, moved, score, left))
     return sorted(done, key=lambda each: -each.drop)

@@ -205,7 +205,7 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
         if not found:
             continue
         tested, drifting = tests(shown.fit, shown.settings), found.noise.walks
-        if _of_others(shown.fit, tested, drifting) <= found.gain:
+        if not _by_others(shown.fit, tested, found.gain, drifting):
             ramps = tuple(
                 each for each in tested if drifting and each.significant and each.candidate.code == DRIFT
             )
@@ -214,17 +214,17 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
     return shown
 
 
-def _of_others(fitted: Fit, tested: list[Tested], walks: bool) -> float:
-    """By how much chi-square falls by what explains most: an effect outside the model that is more than chance, or a
-    wider prior of what lies far outside its own. A drift of the biases is no other effect where these may walk."""
+def _by_others(fitted: Fit, tested: list[Tested], gain: float, walks: bool) -> bool:
+    """True where an effect outside the model that is more than chance, or a wider prior of what lies far outside its
+    own, explains more than noise does by a ``gain``. Beside biases that may walk their drift is no other effect, and
+    others must explain more by more than chance: a walk looks like many."""
     c = fitted.c[fitted.free]
     far = np.abs(c) > LIMITS.far_from_prior * fitted.prior
     wider = fitted.chain._replace(prior=np.where(far, 1e-4, 1.0) * fitted.chain.prior)
     by_prior = solved(fitted.chain, fitted.prior).squares - solved(wider, fitted.prior).squares
-    shown = (
-        each.drop for each in tested if each.significant and not (walks and each.candidate.code == DRIFT)
-    )
-    return max(by_prior, *shown, 0.0)
+    others = (each for each in tested if not (walks and each.candidate.code == DRIFT))
+    better = (each.drop > (gain + each.limit if walks else max(gain, each.limit)) for each in others)
+    return by_prior > gain or any(better)
 
 
 def residuals(fitted: Fit) -> tuple[float, float]:
