@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from inercal.strapdown.averaged import opened
 from inercal.strapdown.batch import fit
-from inercal.strapdown.restricted import with_noise_shown
+from inercal.strapdown.restricted import residuals, with_noise_shown
 from inercal.strapdown.rests import found_rests, nodes_of
 from inercal.strapdown.settings import ESTIMABLE, Motion
 from inercal.strapdown.simulate import simulated
@@ -94,6 +94,16 @@ def in_a_hundred_runs(z):
     lengths = np.sum(z**2, axis=0) / len(z)
     assert 0.95 < np.exp(0.5 * np.mean(np.log(lengths))) < 1.05
     assert np.all((np.sqrt(lengths) > 0.65) & (np.sqrt(lengths) < 1.35))
+
+
+def test_a_unit_that_sways_while_it_turns_is_where_its_gyros_say():
+    """Turns close by gyros that hardly err, though the unit sways by fifty times that: it turns about its own axes."""
+    settings = replace(NAV, rests=replace(NAV.rests, attitude=np.radians(0.01)))
+    samples = simulated(settings, np.zeros(51), np.random.default_rng(7))
+    nodes = nodes_of(samples, found_rests(samples, settings.rests), settings.rests.node)
+    rest, turn = residuals(fit(samples, nodes, settings))
+    assert 0.7 < turn < 1.3
+    assert 0.9 < rest < 1.1
 
 
 @pytest.mark.parametrize("grade", GRADES)

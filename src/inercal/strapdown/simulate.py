@@ -217,7 +217,10 @@ def _disturbed(
     sway = 0.5 * (angle[2:] - angle[:-2]) / ts  # at the stamps, and before the first sample
     at_levers = np.einsum("nii->ni", np.cross((np.diff(sway, axis=0) / ts)[:, None], r))
     angle = angle[1:-1]
-    return np.diff(angle, axis=0) / ts, force + at_levers - np.cross(0.5 * (angle[1:] + angle[:-1]), mean.f)
+    middle = 0.5 * (angle[1:] + angle[:-1])
+    # turned by a small angle, the unit has its own axes for what the plan turns and pushes it by
+    rate = np.diff(angle, axis=0) / ts - np.cross(middle, mean.w)
+    return rate, force + at_levers - np.cross(middle, mean.f)
 
 
 def _smooth(rng: np.random.Generator, count: int, ts: float) -> Array:
