@@ -121,10 +121,11 @@ def platform(folder: Path, times: int) -> list[Row]:
     return found
 
 
-def searches(positions: int, sampled: int) -> list[Row]:
+def searches(folder: Path, positions: int, sampled: int) -> list[Row]:
     """Positions that are chosen, and sampled sensitivities less their start."""
-    study = str(FOLDER / "tumble.toml")
-    got = inercal("design", "positions", study, "--set", f"design.positions={positions}")
+    study, latitude = str(folder / "table.toml"), "site.latitude=48 deg"
+    inercal("new", "turntable", "--out", study)
+    got = inercal("design", "positions", study, "--set", latitude, "--set", f"design.positions={positions}")
     found = pair("`design positions`", f"{positions} positions", got)
     some, more = (python(SAMPLED.format(n=n)) for n in (2, 2 + sampled))
     each = (more[0] - some[0]) / sampled
@@ -140,7 +141,7 @@ def rows(quick: bool) -> list[Row]:
         folder = Path(name)
         if not quick:
             rows(quick=True)  # compiles what is not yet compiled
-        found = files(folder, n) + platform(folder, times) + searches(positions, sampled)
+        found = files(folder, n) + platform(folder, times) + searches(folder, positions, sampled)
     for holes in (False, True):
         what = f"A process with an Allan deviation{', 1 in 10⁴ lost' if holes else ''}"
         found += pair(what, f"{day} samples, 50 averaging times", python(ALLAN.format(n=day, holes=holes)))
