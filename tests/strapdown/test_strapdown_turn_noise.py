@@ -85,13 +85,24 @@ def test_noise_of_turns_is_found():
     assert found.gain > 100.0
 
 
-def test_walks_are_found():
-    """MEMS walks within a third; for hundreds of rests would tell them better."""
-    samples, nodes = run(MEMS, 3)
+@pytest.mark.parametrize("times", [1.0, 20.0])
+def test_walks_are_found(times):
+    """Walks of MEMS, and larger ones: the true sizes are no less likely than one time in a thousand, of the larger none
+    at all is."""
+    noise = replace(MEMS.noise, **{name: times * getattr(MEMS.noise, name) for name in WALKS})
+    samples, nodes = run(replace(MEMS, noise=noise), 3)
     settings = without(MEMS, *WALKS)
     found = with_noise(samples, nodes, settings, fit(samples, nodes, settings), WALKS)
-    assert found.noise.gyro_walk == pytest.approx(MEMS.noise.gyro_walk, rel=0.35)
-    assert found.noise.accelerometer_walk < 4.0 * MEMS.noise.accelerometer_walk
+    shown = replace(settings, noise=replace(found.noise, estimate=WALKS))
+    fixed, parts, s = separated(found.fit, samples, shown, WALKS)
+
+    def deviance(variances):
+        W = np.linalg.inv(fixed + np.einsum("q,qkab->kab", np.array(variances), parts))
+        return solved(found.fit.chain._replace(W=W), found.fit.prior).deviance
+
+    true = [getattr(noise, name) ** 2 for name in WALKS]
+    assert -0.1 < deviance(true) - deviance(s) < chi2.ppf(0.999, 2)
+    assert (found.gain > chi2.ppf(0.999, 2)) == (times > 1.0)
 
 
 def test_what_the_size_of_a_walk_leaves_open_is_in_u():

@@ -99,13 +99,14 @@ def selfcal(
     goal = _goals(settings, of.names) if until_goals else {}
     for finding in left_out:
         say_finding(finding)
-    say(_OF_A_STREAM)
     with compiling(f"selfcal stream {of.filter.kind}", say):
         load_kernels(of)
 
     def estimator(lines: Lines) -> Selfcal:
         of_stream = as_recorded(lines.record, settings)
-        return Selfcal(lines, problem(of_stream), interval, say_finding, of_stream.fixed, goal)
+        made = Selfcal(lines, problem(of_stream), interval, say_finding, of_stream.fixed, goal)
+        say(_OF_A_STREAM)
+        return made
 
     return estimator
 
@@ -114,14 +115,14 @@ _OF_A_STREAM = (
     "u of a stream is by noise and prior alone: record it, and `inercal selfcal FILE` counts what is stated with an "
     "uncertainty and errors of the rig that are no states as well, and judges them"
 )
-"""What u of a platform's lines has not in it."""
+"""Words on u of a platform's lines."""
 
 
 _WITHOUT_A_RECORDING = (
     "walks of biases and noise of turns that the study does not state count as none in a stream: record it, and "
     "`inercal calibrate strapdown FILE` finds them, and counts them in u"
 )
-"""What the lines of a strapdown unit leave out."""
+"""Words on noise that the lines of a strapdown unit leave out."""
 
 
 def _goals(settings: SelfcalSettings, names: Sequence[str]) -> Mapping[str, float]:
@@ -137,11 +138,16 @@ def strapdown(settings: StrapdownSettings, say: Say, say_finding: SayFinding) ->
     """Prepare a calibration of a strapdown unit rest by rest."""
     from inercal.stream.strapdown import Strapdown, load_kernels
 
-    if settings.noise.estimate:
-        say(_WITHOUT_A_RECORDING)
     with compiling("strapdown stream", say):
         load_kernels(settings)
-    return lambda lines: Strapdown(lines, settings, say_finding)
+
+    def estimator(lines: Lines) -> Strapdown:
+        made = Strapdown(lines, settings, say_finding)
+        if settings.noise.estimate:
+            say(_WITHOUT_A_RECORDING)
+        return made
+
+    return estimator
 
 
 def monitor(interval: float, say: Say) -> Make:

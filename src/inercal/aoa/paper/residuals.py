@@ -157,7 +157,7 @@ def error_terms(
 def _matrices(
     prior: Prior, noise: Noise, layout: Layout, level: float, step: float
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array, float]:
-    """What the terms of `error_terms` are made of, which rows share: outer products of the arms q and p with themselves
+    """Parts of the terms of `error_terms`, which rows share: outer products of the arms q and p with themselves
     and each other, of errors of places with the squares and the product of rate and acceleration, and that which is
     always there, with the doubt of a rate that is differentiated over the ``step`` [s], infinite where none is."""
     n = len(layout.names)

@@ -134,6 +134,8 @@ def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: boo
     dt = np.diff(mean(t)[:, 0])
     speed = np.abs(np.diff(mean(np.unwrap(th, axis=0)), axis=0)).max(axis=1) / dt
     still = np.maximum(np.append(speed, 0.0), np.append(0.0, speed)) < 0.1 * limit
+    # at the ends one neighbour is not known: a swing about its turning point has two equal means
+    still[0], still[-1] = still[0] and still[1], still[-1] and still[-2]
     rate = mean(rate)
     turns_missed = []
     for stay in _runs(still):

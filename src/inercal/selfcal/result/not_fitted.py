@@ -69,8 +69,8 @@ class _Effects(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What recordings say of errors: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual`` (q,)
-    sizes [SI]; of each per usual size its ``score`` (q,), ``information`` (q, q) and the change of the coefficients,
+    """Evidence of errors in recordings: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual``
+    (q,) sizes [SI]; of each per usual size its ``score`` (q,), ``information`` (q, q) and the change of the coefficients,
     linear form, ``shift`` (p, q)."""
 
     kinds: tuple[str, ...]
@@ -93,7 +93,7 @@ def not_fitted(
 
 
 def evidence(recording: Recording, settings: SelfcalSettings, result: FilterResult) -> Evidence | None:
-    """What a recording says of errors that are not fitted by the ``result`` of a filter; None as in `not_fitted`."""
+    """Evidence that a recording has of errors which the ``result`` of a filter leaves out; None as in `not_fitted`."""
     if not {*RIG} <= {*settings.kinds}:
         return None
     case = averaged(recording, problem(settings), result)
@@ -142,8 +142,8 @@ def of_all(each: Sequence[Evidence]) -> Evidence:
 
 
 def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> NotFitted:
-    """What the errors add to coefficients of these ``names`` (p,), with their ``slope`` (p, p) by the linear form and
-    ``u`` (p,) without."""
+    """Uncertainty that the errors add to coefficients of these ``names`` (p,), with their ``slope`` (p, p) by the
+    linear form and ``u`` (p,) without."""
     kinds = tuple(dict.fromkeys(found.kinds))
     moment = joint_second_moment(
         found.score, found.information, np.array([kinds.index(kind) for kind in found.kinds])

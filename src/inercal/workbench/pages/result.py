@@ -51,7 +51,7 @@ def add(bench: Bench) -> None:
                 return
             _verdict(bench, session, result)
             _residuals(session, result)
-            place = ui.element("div").classes("w-full")
+            place = ui.element("div").classes("" if job.report is None else "place-of-report")
             _coefficients(result)
             _budget(result)
             heading("Take it along")
