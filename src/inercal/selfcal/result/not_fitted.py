@@ -70,8 +70,8 @@ class _Effects(NamedTuple):
 
 class Evidence(NamedTuple):
     """Evidence of errors in recordings: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual``
-    (q,) sizes [SI]; of each per usual size its ``score`` (q,), ``information`` (q, q) and the change of the coefficients,
-    linear form, ``shift`` (p, q)."""
+    (q,) sizes [SI]; of each per usual size its ``score`` (q,), ``information`` (q, q) and the change of the
+    coefficients, linear form, ``shift`` (p, q)."""
 
     kinds: tuple[str, ...]
     names: tuple[str, ...]
