@@ -5,8 +5,8 @@
 Writes results.md, results.json and cost.svg. The long campaigns are not in it but for the short ones of `accuracy.py`;
 each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`, `turntable_coverage.py`,
 `selfcal_coverage.py`, `selfcal_robustness.py`, `strapdown_coverage.py`, `aoa_bands.py`, `aoa_endless.py`,
-`faults.py`; so are `workbench_speed.py`, and `workbench_browser.py`, `stream_latency.py` and `live.py`, whose figures
-are of the clock on the wall.
+`faults.py`; so are `long_rows.py`, `workbench_speed.py`, and `workbench_browser.py`, `stream_latency.py` and `live.py`,
+whose figures are of the clock on the wall.
 """
 
 import argparse
