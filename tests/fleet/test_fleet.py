@@ -14,13 +14,16 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from independent.fleet import made
 
 import inercal as ic
 from inercal.cli import run
 from inercal.errors import InputError
+from inercal.estimate.cluster import ChunkLostError, Cluster
 from inercal.estimate.executors import Processes
-from inercal.fleet.batch import _rows
+from inercal.fleet.batch import _chunks, _rows
 from inercal.fleet.manifest import Unit, read_manifest
 from inercal.fleet.unit import Batch, content_of, row_of, row_path
 from inercal.laboratory.store import make_store
@@ -173,6 +176,29 @@ def test_a_unit_that_ends_its_process_is_a_row(there, tmp_path):
     assert [row.serial for row in rows] == [unit.serial for unit in units]
     assert [row.serial for row in rows if row.status == "failed"] == ["SN 002"]
     assert row_of(out, "SN 002").message.startswith("its process was ended")
+
+
+class Losing(Cluster):
+    """A cluster that gives a chunk up where its third unit is, as one that ended several workers."""
+
+    def map(self, work, chunks):
+        for chunk in chunks:
+            if 2 in chunk:
+                raise ChunkLostError(chunk)
+            yield chunk, work(chunk)
+
+
+@pytest.mark.slow
+def test_of_units_that_went_out_together_one_that_ends_its_process_is_a_row(there, tmp_path, monkeypatch):
+    folder, out = few(there, tmp_path / "copy", 4), tmp_path / "lost"
+    for name in ("units", "results"):
+        (out / name).mkdir(parents=True)
+    units = read_manifest(folder / "fleet.csv")
+    work = Deadly(folder / "fleet.csv", content_of(units), folder / "imu.toml", None, out)
+    monkeypatch.setattr("inercal.fleet.batch._chunks", lambda numbers, size: _chunks(numbers, 4))
+    rows = _rows(work, units, Losing("local", 1), 1, lambda done, all: None)
+    assert [row.serial for row in rows] == [unit.serial for unit in units]
+    assert [row.serial for row in rows if row.status == "failed"] == ["SN 002"]
 
 
 def test_results_are_kept_once(there, tmp_path):
@@ -343,3 +369,10 @@ def test_no_input_is_written_over(there, tmp_path, capsys):
     assert "whose files are recordings" in capsys.readouterr().err
     assert (folder / "units.csv").read_bytes() == before
     assert not (folder / "out").exists()
+
+
+@given(st.sets(st.integers(0, 60)), st.integers(1, 9))
+def test_units_go_out_each_once_in_ranges_of_at_most_so_many(numbers, size):
+    chunks = _chunks(sorted(numbers), size)
+    assert [n for chunk in chunks for n in chunk] == sorted(numbers)
+    assert all(1 <= len(chunk) <= size for chunk in chunks)

@@ -135,8 +135,8 @@ def test_the_command_fits_records_together_and_names_what_changed(tmp_path):
 
 
 def test_errors_of_the_rig_that_no_state_has_are_in_u_of_a_common_fit(tmp_path):
-    """K2 of 10 ug/g^2 is the same in all records: more than 4 u off by noise and prior, within 4 u as stated, told, and
-    no larger part of u than in a record alone, of which the others know nothing."""
+    """K2 of 10 ug/g^2 is the same in all records: more than 4 u off by noise and prior, within 4 u as stated, most
+    of some u, and told."""
     names, rng = [f"r{k}.csv" for k in range(3)], np.random.default_rng(11)
     asked = of_study(tmp_path, names, PLACES[:3])
     truth, of_rig = drawn(rng)

@@ -37,9 +37,8 @@ def as_shown(settings, c, rng):
     noise = replace(settings.noise, gyro_walk=0.0, accelerometer_walk=0.0, estimate=ESTIMABLE)
     without = replace(settings, noise=noise)
     shown, found, _ = with_noise_shown(samples, nodes, without, fit(samples, nodes, without))
-    more = (
-        opened(found, samples, shown) if shown.noise.estimate else 0.0
-    )  # chance may look like another effect
+    # chance may look like another effect, in whose place no noise is found
+    more = opened(found, samples, shown) if shown.noise.estimate else 0.0
     return found, found.covariance + more
 
 

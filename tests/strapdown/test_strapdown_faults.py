@@ -20,7 +20,8 @@ def result_of(name, seed=0):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["none", "no walk, stated as 0"])
 def test_a_sound_record_of_another_simulator_is_ok_and_met(name):
-    """With walks that the study leaves to the recording u is rather too large: no record excludes small ones."""
+    """With walks that the study leaves to the recording u is rather too large, for no record excludes small ones: the
+    squared error may be half of what chance leaves."""
     runs = [result_of(name, seed) for seed in range(3)]
     for estimate, _ in runs:
         assert estimate.status is Status.OK
