@@ -23,6 +23,18 @@ def known(values: Array) -> tuple[Array, NDArray[np.int64]]:
     return (values if rows.size == values.size else values[rows]), rows
 
 
+def numbers(values: Array) -> Array:
+    """The numbers of a column without its NaN."""
+    finite = np.isfinite(values)
+    return values if finite.all() else values[finite]
+
+
+def rows_of(values: Array, at: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows (from 0) in which some of the `numbers` of a column stand, counted from 0."""
+    finite = np.isfinite(values)
+    return at if finite.all() else np.flatnonzero(finite)[at]
+
+
 def thinned(values: Array) -> Array:
     """Every so many-th value, about a hundred thousand in all."""
     return values[:: values.size // SAMPLE + 1]
@@ -111,7 +123,7 @@ def _rate_change(
 
 def time_unit(t: Array, subject: str = "t") -> list[Finding]:
     """``unit_suspect``: intervals of seconds or of microseconds, where inertial data is sampled."""
-    stamps, _ = known(t)
+    stamps = numbers(t)
     if stamps.size < 500:
         return []
     interval = float(np.median(np.diff(stamps)))
@@ -148,7 +160,7 @@ def saturated(values: Array) -> NDArray[np.int64]:
     all samples in them.
     """
     none = np.zeros(0, dtype=np.int64)
-    signal, rows = known(values)
+    signal = numbers(values)
     if signal.size < _FEWEST:
         return none
     low, high = signal.min(), signal.max()
@@ -171,7 +183,7 @@ def saturated(values: Array) -> NDArray[np.int64]:
     if 2 * samples <= length.sum() or 2 * samples > signal.size:
         return none
     runs = np.concatenate([np.arange(a, b + 1) for a, b in zip(starts[extreme], ends[extreme], strict=True)])
-    return np.asarray(rows[runs], dtype=np.int64)
+    return rows_of(values, runs)
 
 
 def outliers(values: Array, name: str) -> list[Finding]:
@@ -199,9 +211,9 @@ def outlying(values: Array) -> NDArray[np.int64]:
     median over the recording, and from the fifth largest of the 42 around the sample (two of them its own),
     so that motion is measured against motion.
     """
-    signal, rows = known(values)
+    signal = numbers(values)
     if signal.size <= _AROUND:
-        return rows[:0]
+        return np.zeros(0, dtype=np.int64)
     every = (signal.size - 1) // SAMPLE + 1
     usual = np.abs(signal[1::every] - signal[:-1:every])
     noise = max(np.median(usual) / 0.674, usual.min(initial=np.inf, where=usual > 0))
@@ -209,15 +221,15 @@ def outlying(values: Array) -> NDArray[np.int64]:
     peaks = []
     for first in range(0, signal.size - 2, SAMPLE // 4):  # what a processor keeps near
         step = np.diff(signal[first : first + SAMPLE // 4 + 2])
-        size = np.abs(step)
-        height = np.minimum(size[:-1], size[1:])
-        height[(step[:-1] > 0) == (step[1:] > 0)] = 0.0
-        suspects = np.flatnonzero(height > 12.0 * noise)
+        large = np.flatnonzero(np.abs(step) > 12.0 * noise)
+        suspects = large[:-1][np.diff(large) == 1]
+        suspects = suspects[(step[suspects] > 0) != (step[suspects + 1] > 0)]
+        height = np.minimum(np.abs(step[suspects]), np.abs(step[suspects + 1]))
         near = windows[np.clip(first + suspects - _AROUND // 2, 0, len(windows) - 1)]
         steps = np.abs(np.diff(near, axis=1))
         moved = np.partition(steps, _AROUND - 5, axis=1)[:, _AROUND - 5] / 1.645
-        peaks.append(first + suspects[height[suspects] > 12.0 * moved])
-    return np.asarray(rows[np.concatenate(peaks) + 1], dtype=np.int64)
+        peaks.append(first + suspects[height > 12.0 * moved])
+    return rows_of(values, np.concatenate(peaks) + 1)
 
 
 def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
@@ -249,7 +261,7 @@ def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
     findings = []
     for name in ("gyro_x", "gyro_y", "gyro_z", "gyro", "gyro_roll", "gyro_yaw"):
         if name in columns and (unit := columns[name].unit).dimension == "rate":
-            signal, _ = known(columns[name].values)
+            signal = numbers(columns[name].values)
             if 1000 * np.count_nonzero(np.abs(signal) > 100.0 / unit.factor) > signal.size:
                 looks = {"rad/s": "deg/s", "deg/s": "mdeg/s"}.get(unit.symbol, "a smaller unit")
                 text = f"{name}: rates up to {np.abs(signal).max():.6g} {unit.symbol} look like {looks}"
@@ -259,7 +271,7 @@ def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
 
 def temperature_unit(column: Column) -> list[Finding]:
     """``unit_suspect``: temperatures that no instrument stands, one in a thousand outside -100 to 200 degC."""
-    signal, _ = known(column.values)
+    signal = numbers(column.values)
     if column.unit.dimension != "temperature" or signal.size == 0:
         return []
     low, high = ((limit - column.unit.zero) / column.unit.factor for limit in (-100.0, 200.0))
@@ -279,7 +291,7 @@ def dead_channel(values: Array, name: str) -> list[Finding]:
     """``dead_channel``: a sensor that never changes, which its noise alone would make it do."""
     if not is_dead(values):
         return []
-    signal, _ = known(values)
+    signal = numbers(values)
     text = f"{name}: all {signal.size} samples are {signal[0]:.6g}, a dead or empty channel"
     return [Finding("dead_channel", text, harm=(name,))]
 
@@ -287,7 +299,7 @@ def dead_channel(values: Array, name: str) -> list[Finding]:
 def is_dead(values: Array) -> bool:
     """True if all of at least ten values (n,) are equal."""
     for part in (values[:SAMPLE], values):  # the first of them tell of most
-        signal, _ = known(part)
+        signal = numbers(part)
         if (signal != signal[:1]).any():
             return False
     return signal.size >= _FEWEST
