@@ -4,12 +4,17 @@ Each test runs other processes, on a copy of the package where sources change, s
 processes and not in one.
 """
 
+import importlib
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
+import typing
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 import inercal
@@ -112,3 +117,70 @@ np.testing.assert_allclose(kernels.rotate(q0, omega[0]), rotations.rotate(q0, om
 print("same")
 """
     assert python(program, NUMBA_DISABLE_JIT=1) == "same"
+
+
+def kernels():
+    """All kernels of the package, with their names."""
+    found = {}
+    for module in pkgutil.walk_packages(inercal.__path__, "inercal."):
+        if "__main__" in module.name or "migrations" in module.name:  # which do something when imported
+            continue
+        for name, value in vars(importlib.import_module(module.name)).items():
+            if isinstance(value, numba.core.registry.CPUDispatcher):
+                found[value] = f"{value.py_func.__module__}.{name}"
+    return found
+
+
+def of_arrays(kind):
+    """True for a type that is, or holds, an array."""
+    if np.ndarray in (kind, typing.get_origin(kind)):
+        return True
+    fields = typing.get_args(kind)
+    if isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields"):
+        fields = typing.get_type_hints(kind).values()
+    return any(map(of_arrays, fields))
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are plain functions here")
+def test_kernels_that_count_no_references_are_handed_no_new_arrays():
+    """An array that such a kernel returned would be freed twice, one that it got from another never."""
+    every = kernels()
+    returning = {each for each in every if of_arrays(typing.get_type_hints(each.py_func)["return"])}
+    plain = [each for each in every if not each.targetoptions["_nrt"]]
+    assert len(plain) > 150
+    for each in plain:
+        assert each not in returning, every[each]
+        function = each.py_func
+        called = [function.__globals__.get(name) for name in function.__code__.co_names]
+        given = [every[other] for other in called if isinstance(other, type(each)) and other in returning]
+        assert not given, f"{every[each]} gets arrays from {given}"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are plain functions here")
+def test_kernels_free_what_they_make():
+    """After the shipped example of each system no array that a kernel made is left."""
+    program = """
+import gc
+from inercal.cli import main
+from inercal.examples import FOLDER
+from numba.core.runtime import rtsys
+def run(*words):
+    try:
+        main([*words, "--quiet"])
+    except SystemExit:
+        pass
+    gc.collect()
+    stats = rtsys.get_allocation_stats()
+    return stats.mi_alloc, stats.mi_alloc - stats.mi_free
+for words in (
+    ["selfcal", str(FOLDER / "selfcal.csv.gz"), "--study", str(FOLDER / "selfcal.toml")],
+    ["aoa", str(FOLDER / "sting.csv.gz"), "--study", str(FOLDER / "sting.toml")],
+):
+    run(*words)
+    made, kept = run(*words)
+    again, still = run(*words)
+    assert again > made and still == kept, (words, made, kept, again, still)
+print("freed")
+"""
+    assert python(program, NUMBA_NRT_STATS=1).endswith("freed")

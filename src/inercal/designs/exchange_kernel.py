@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
@@ -44,7 +44,7 @@ class State(NamedTuple):
     trace: float
 
 
-@kernel
+@allocating
 def update(W: Array, P: Array) -> Update:
     """The update about an information matrix whose inverse is P (d, d)."""
     c, _, m = W.shape
@@ -57,7 +57,7 @@ def update(W: Array, P: Array) -> Update:
     return Update(W, G, F, added)
 
 
-@kernel
+@allocating
 def along(W: Array, P: Array) -> Array:
     """``W P`` (c, d, m) for P (d, d), symmetric."""
     product = np.empty(W.shape)
@@ -66,7 +66,7 @@ def along(W: Array, P: Array) -> Array:
     return product
 
 
-@kernel
+@allocating
 def own_products(left: Array, right: Array) -> Array:
     """``left``_j ``right``_j^T (c, c, m) of rows (c, d, m), where that is symmetric."""
     c, d, m = left.shape
@@ -80,7 +80,7 @@ def own_products(left: Array, right: Array) -> Array:
     return products
 
 
-@kernel
+@allocating
 def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
     """The candidate, not one ``taken`` (m,), that lessens the criterion most in the place of i, the first of equals,
     and its factor of the determinant or trace of the covariance."""
@@ -113,7 +113,7 @@ def improves(factor: float) -> bool:
     return factor < 1.0 - TIE
 
 
-@kernel
+@allocating
 def _products(rows: Array, others: Array, i: int) -> Array:
     """``rows``_j ``others``_i^T (c, c, m) of rows (c, d, m)."""
     c, _, m = rows.shape
@@ -124,7 +124,7 @@ def _products(rows: Array, others: Array, i: int) -> Array:
     return products
 
 
-@kernel
+@allocating
 def _removed(of: Update, i: int) -> tuple[Array, Array, Array]:
     """After adding each j and removing i: A = F S_ji (c, c, m), the inverse of E, and the factor (m,) of the
     determinant."""
@@ -149,7 +149,7 @@ def _removed(of: Update, i: int) -> tuple[Array, Array, Array]:
     return A, inverse, factor
 
 
-@kernel
+@allocating
 def _more(F: Array, K: Array, K_own: Array, i: int, A: Array, inverse: Array) -> Array:
     """Growth of the trace (m,) when each j takes the place of i; products ``K`` with i, ``K_own`` with itself."""
     c, _, m = F.shape

@@ -14,7 +14,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -61,13 +61,13 @@ def forward(L: Array, b: Array) -> None:
         b[i] = total / L[i, i]
 
 
-@kernel
+@allocating
 def _eigen(R: Array) -> tuple[Array, Array]:
     """Eigenvalues in ascending order and eigenvectors (columns) of a symmetric matrix."""
     return np.linalg.eigh(R)
 
 
-@kernel
+@allocating
 def _singular(R: Array) -> tuple[Array, Array]:
     """The same by singular values: s u.v, and left singular vectors.
 
@@ -88,7 +88,7 @@ def _singular(R: Array) -> tuple[Array, Array]:
     return s, u
 
 
-@kernel
+@allocating
 def root(P: Array, kind: int, out: Array, work: Array) -> tuple[bool, float]:
     """Write a root of a covariance ``P`` (n, n) to ``out`` (n, n): its columns add up to it, ``P = out out^T``.
 

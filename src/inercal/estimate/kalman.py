@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
@@ -22,7 +22,7 @@ class Row(NamedTuple):
     values: Array
 
 
-@kernel
+@allocating
 def empty_row(size: int) -> Row:
     """Room for a row of at most ``size`` entries."""
     return Row(np.empty(size, dtype=np.int64), np.empty(size))

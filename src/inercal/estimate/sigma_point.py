@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.estimate.factor import cholesky, forward, root
 
 Array: TypeAlias = NDArray[np.float64]
@@ -84,7 +84,7 @@ class Points(NamedTuple):
     health: Array
 
 
-@kernel
+@allocating
 def empty_points(n: int) -> Points:
     """Room for the points of ``n`` states."""
     return Points(np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.array([math.nan, 0.0]))
@@ -114,7 +114,7 @@ class Moments(NamedTuple):
     odd: Array
 
 
-@kernel
+@allocating
 def empty_moments(n: int, m: int) -> Moments:
     """Room for the moments of ``m`` readings and ``n`` states."""
     return Moments(np.empty(m), np.empty((m, m)), np.empty((n, m)), np.empty((n, m)))

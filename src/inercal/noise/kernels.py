@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 
 Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
@@ -42,7 +42,7 @@ def mean_square(sums: Array, m: int) -> float:
     return ((a + b) + (c + d)) / count
 
 
-@kernel
+@allocating
 def mean_square_with_gaps(
     sums: Array, present: Counts, runs: Counts, m: int, least: int
 ) -> tuple[float, int, float, float]:
@@ -126,7 +126,7 @@ def curvature(lag: int, m: int, out: Array) -> None:
     out[3] = (1.0 if t == a else 0.0) - (2.0 if lag == 0 else 0.0)
 
 
-@kernel
+@allocating
 def covariance_sums(
     lags: Integers, weights: Array, m: int, other: int, products: Array, singles: Array
 ) -> None:

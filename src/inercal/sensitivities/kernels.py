@@ -22,7 +22,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.sensitivities.indices import VarianceParts
 
@@ -213,7 +213,7 @@ def carry(n: int, begin: int, rig: Rig, rays: Rays) -> None:
             advance(columns, c, e, elements[e], fixed, errors, cosines, -1.0)
 
 
-@kernel
+@allocating
 def start(vectors: Array, at: int, length: int) -> Array:
     """States (r, length, 12) with the vectors (r, 3) at one end, without scatter."""
     states = np.zeros((len(vectors), length, 12))
@@ -223,14 +223,14 @@ def start(vectors: Array, at: int, length: int) -> Array:
     return states
 
 
-@kernel
+@allocating
 def begun(rig: Rig) -> Rays:
     """The rows at the first element and the columns after the last one."""
     m = len(rig.elements)
     return Rays(start(rig.u, 0, m + 1), start(rig.v, m, m + 1), np.zeros((rig.angles.shape[1], 2)))
 
 
-@kernel
+@allocating
 def analyse(begin: int, end: int, rig: Rig, results: VarianceParts) -> None:
     """Parts of the variance at the positions ``begin`` to ``end``; columns without an element are left alone."""
     elements, errors, outputs = rig.elements, rig.errors, rig.outputs
@@ -252,7 +252,7 @@ def analyse(begin: int, end: int, rig: Rig, results: VarianceParts) -> None:
             variance[o, n], bias[o, n] = all_variance, all_bias
 
 
-@kernel
+@allocating
 def second_order(begin: int, end: int, rig: Rig, second: Array) -> None:
     """Parts V_ij of the variance caused by pairs of errors, into ``second`` (o, n, k, k).
 

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating
 from inercal.aoa.fusion.loop import LOST, OUTPUTS, root
 from inercal.aoa.fusion.model import Constants
 
@@ -59,7 +59,7 @@ def between(t: Array, theta: tuple[Array, ...], at: Array) -> Array:
     return out
 
 
-@kernel
+@allocating
 def _carry_on(motions: Array, ahead: Array, constants: Constants, out: Array) -> None:
     """The loop of `carried_on`."""
     of_theta, of_rate = np.zeros(4), np.zeros(4)

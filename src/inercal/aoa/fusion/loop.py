@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.aoa.fusion.model import (
     WIDEST,
     Constants,
@@ -312,7 +312,7 @@ def advance(
     return done
 
 
-@kernel
+@allocating
 def _advance(
     belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory, motions: Array
 ) -> int:

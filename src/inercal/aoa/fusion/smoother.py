@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.aoa.fusion import loop
 from inercal.aoa.fusion.loop import NOT_KEPT, OUTPUTS, Belief, Kept, Memory, Rows, congruent, root, write
 from inercal.aoa.fusion.model import Model
@@ -75,7 +75,7 @@ def load_kernels(problem: FilterProblem) -> None:
     smooth(problem, np.zeros(1), none, Trace(np.empty((1, 0)), (), (head,)))
 
 
-@kernel
+@allocating
 def _backward(
     lam: Array, Lam: Array, memory: Memory, size: int, model: Model, out: Array, kept: Kept
 ) -> None:

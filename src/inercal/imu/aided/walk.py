@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 
 
-@kernel
+@allocating
 def _forward(
     columns: Array, gaps: Array, white: Array, squares: Array, out: Array, size: Array, gain: Array
 ) -> Array:

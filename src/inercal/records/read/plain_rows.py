@@ -14,7 +14,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 
 Bits = np.uint64
@@ -89,7 +89,7 @@ def _bits(w: Bits, q: int, powers: NDArray[Bits]) -> Bits:
     return (mantissa & ~_HIDDEN) | (np.uint64(power) << np.uint64(52))
 
 
-@kernel
+@allocating
 def _nearest(w: Bits, q: int, powers: NDArray[Bits]) -> float:
     """The float nearest to w 10^q, NaN where this cannot tell."""
     if w == 0:

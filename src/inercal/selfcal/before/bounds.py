@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import Vector
@@ -279,7 +279,7 @@ def arrived(path: Path, k: int, c: Array, earth: Vector, up: Vector) -> tuple[St
     return Step(commanded, rate, earth, at, dt, force, warm), read
 
 
-@kernel
+@allocating
 def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> None:
     """Covariance of the error state along a path, in place.
 

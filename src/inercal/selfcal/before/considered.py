@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
 from inercal.geometry.kernels import exp, right_jacobian, rotate
@@ -163,7 +163,7 @@ def _on_encoders(P: Array, S: Array, wide: FilterProblem, th: Array, c: Array, r
     S[:3] = own @ S[3:] + slope[:, p:]
 
 
-@kernel
+@allocating
 def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: Array) -> None:
     """Covariance ``P`` (n, n) of the error state and sensitivities ``S`` (n, m) along a path, in place; ``c`` is the
     whole full vector, linear form; in the layout considered states have the places behind the n. ``slopes`` (rows, 6,

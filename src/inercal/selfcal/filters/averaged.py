@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply
 from inercal.selfcal.filters.filter_result import FilterResult
@@ -143,7 +143,7 @@ class _Means(NamedTuple):
     rate: Array
 
 
-@kernel
+@allocating
 def _average(
     q: Array,
     rows: _Rows,

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating
 from inercal.arrays import Array
 from inercal.geometry.rotations import (
     boxminus,
@@ -279,7 +279,7 @@ def _per_row(terms: _Terms, measured: Measurements) -> Array:
     return nis
 
 
-@kernel
+@allocating
 def inverse_diagonal(factor: Array, out: Array) -> None:
     """Diagonal ``out`` (m,) of the inverse of a banded matrix, without the rest (Takahashi et al. 1973).
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row, innovation_variance, scalar_update
 from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
@@ -181,7 +181,7 @@ def encoder_update(
     return total
 
 
-@kernel
+@allocating
 def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th

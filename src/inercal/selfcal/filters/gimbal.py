@@ -20,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import draw, empty_moments, empty_points, moments, update, weights
@@ -200,7 +200,7 @@ def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: 
         z[1 + k, 3], z[1 + k, 4], z[1 + k, 5] = d
 
 
-@kernel
+@allocating
 def _advance(
     state: State, model: FilterModel, factor: int, euler: bool, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:

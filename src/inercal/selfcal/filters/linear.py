@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating
 from inercal.arrays import Array
 from inercal.estimate.kalman import empty_row, innovation_variance, scalar_update
 from inercal.geometry.rotations import boxplus, exp, multiply, normalize
@@ -118,7 +118,7 @@ def _room(m: int, p: int) -> _Along:
     return _Along(np.empty((m, 3 + p)), np.empty((m, 3 + p)), np.empty(m), np.empty((m, 6)))
 
 
-@kernel
+@allocating
 def _filter(P: Array, system: _System, out: _Along) -> Array:
     """Take the filter through all steps, ``P`` (3 + p, 3 + p) in place; returns the state (3 + p,) at the end."""
     F, B, u, Q, H, z = system

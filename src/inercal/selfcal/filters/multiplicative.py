@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.kalman import empty_row
@@ -149,7 +149,7 @@ def _read(
         )
 
 
-@kernel
+@allocating
 def _advance(
     state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:

@@ -20,7 +20,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.factor import FACTORS
 from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, mean, update, weights
@@ -169,7 +169,7 @@ def _propagate(
             row += 1
 
 
-@kernel
+@allocating
 def _advance(
     state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:

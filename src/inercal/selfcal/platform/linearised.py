@@ -19,7 +19,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, right_jacobian, rotate
@@ -78,7 +78,7 @@ class Columns(NamedTuple):
     axes: Array
 
 
-@kernel
+@allocating
 def empty_columns() -> Columns:
     """Room for columns."""
     return Columns(np.empty(WIDEST, dtype=np.int64), np.empty((WIDEST, 3)))

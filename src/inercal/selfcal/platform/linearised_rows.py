@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from inercal._jit import kernel
+from inercal._jit import allocating
 from inercal.arrays import Array
 from inercal.estimate.kalman import empty_row
 from inercal.geometry.kernels import right_jacobian
@@ -42,7 +42,7 @@ class LinearisedRows(NamedTuple):
     by_acc: Array
 
 
-@kernel
+@allocating
 def linearise_rows(
     q: Array, th: Array, steps: Steps, c: Array, layout: Layout, world: World, out: LinearisedRows
 ) -> None:
@@ -70,7 +70,7 @@ def linearise_rows(
                 out.by_acc[k, i, row.places[a]] = row.values[a]
 
 
-@kernel
+@allocating
 def linearise_steps(
     q: Array, steps: Steps, c: Array, layout: Layout, world: World, turn: Array, slope: Array
 ) -> None:
