@@ -173,7 +173,7 @@ def _start(rows: Array, n: int, repeats: bool, rng: np.random.Generator) -> Indi
 
 def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: bool) -> Indices:
     """The design (n,) at the end of all exchanges that improve it."""
-    from inercal.designs.exchange_kernel import best_exchange, improves
+    from inercal.designs.exchange_kernel import next_exchange
 
     rows = np.ascontiguousarray(np.moveaxis(W, 0, 2))
     chosen, n = first.copy(), len(first)
@@ -183,17 +183,16 @@ def _improved(W: Array, p: int, weights: Array | None, first: Indices, repeats: 
     state = _state(rows, p, weights, M)
     taken = np.zeros(len(W), dtype=bool)
     taken[chosen] = not repeats
-    k, unchanged = 0, 0
-    while unchanged < n:
-        best, factor = best_exchange(state, int(chosen[k]), taken)
-        unchanged += 1
-        if improves(factor):
-            taken[chosen[k]], taken[best] = False, not repeats
-            M += W[best].T @ W[best] - W[chosen[k]].T @ W[chosen[k]]
-            chosen[k], unchanged = best, 0
-            state = _state(rows, p, weights, M)
+    k = 0
+    while True:
+        k, best = next_exchange(state, chosen, k, taken)
+        if best < 0:
+            return chosen
+        taken[chosen[k]], taken[best] = False, not repeats
+        M += W[best].T @ W[best] - W[chosen[k]].T @ W[chosen[k]]
+        chosen[k] = best
+        state = _state(rows, p, weights, M)
         k = (k + 1) % n
-    return chosen
 
 
 def _first_least(values: Array) -> int:

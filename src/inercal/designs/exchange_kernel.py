@@ -107,10 +107,17 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
     return 0, np.inf
 
 
-@kernel
-def improves(factor: float) -> bool:
-    """True if an exchange is more than rounding."""
-    return factor < 1.0 - TIE
+@allocating
+def next_exchange(state: State, chosen: NDArray[np.intp], k: int, taken: Mask) -> tuple[int, int]:
+    """The first place of a design ``chosen`` (n,), from k on and around, in which an exchange improves it by more than
+    rounding, and the candidate for it; -1 where none does."""
+    n = len(chosen)
+    for step in range(n):
+        place = (k + step) % n
+        best, factor = best_exchange(state, chosen[place], taken)
+        if factor < 1.0 - TIE:
+            return place, best
+    return k, -1
 
 
 @allocating

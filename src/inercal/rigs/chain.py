@@ -272,7 +272,7 @@ class Chain:
         """
         angles, errors = self._checked(angles, errors)
         _, others = self._checked(angles, others)
-        C_nb = np.repeat(self.attitude(angles, errors)[None], len(self.errors), axis=0)
+        C_nb = np.empty((len(self.errors), len(errors), 3, 3))
         turns = [_rotation(*each) for each in self._values(angles, errors)]
         behind = [np.eye(3)]
         for turn in reversed(turns[1:]):
@@ -284,6 +284,7 @@ class Chain:
                     C_nb[k] = before @ _rotation(element, other) @ after
                 k += 1
             before = before @ turn
+        C_nb[[error.is_offset for error in self.errors]] = before
         return C_nb
 
     def slopes(self, angles: ArrayLike) -> Array:

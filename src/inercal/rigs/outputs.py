@@ -31,7 +31,8 @@ class Output:
 
     def value(self, C_nb: Array) -> Array:
         """The output (*batch) [``unit``] for attitudes (*batch, 3, 3)."""
-        return np.asarray(self.reference @ C_nb @ self.axis)
+        terms = np.outer(self.reference, self.axis).ravel()
+        return np.asarray(C_nb.reshape(*C_nb.shape[:-2], 9) @ terms)
 
     def slope(self, C_nb: Array, change: Array) -> Array:
         """Change (*batch) of the output for a small ``change`` of the attitudes, both (*batch, 3, 3)."""

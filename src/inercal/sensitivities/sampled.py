@@ -99,30 +99,25 @@ def estimate(f_A: Array, f_B: Array, f_AB: Array, resamples: int, rng: np.random
     in noise. The bootstrap, of 2 ``resamples`` or more, takes the rows for independent: for Sobol points it states too
     much, up to some twenty times where the outputs are almost linear.
     """
-    n = len(f_A)
+    n, o = f_A.shape
+    k = len(f_AB)
     mean = 0.5 * (f_A.mean(axis=0) + f_B.mean(axis=0))
     y_A, y_B = f_A - mean, f_B - mean
-    change = np.moveaxis(f_AB - f_A, 0, -1)  # (n, o, k)
-    terms = (
-        0.5 * (y_A + y_B),
-        0.5 * (np.square(y_A) + np.square(y_B)),
-        y_B[..., None] * change,
-        0.5 * np.square(change),
-    )
-    variance, first, total = _moments(terms, np.full((1, n), 1.0 / n))
+    change = np.moveaxis(f_AB, 0, -1) - f_A[..., None]
+    terms = np.empty((n, 2 * o * (1 + k)))  # one matrix, for one product with all resamples
+    terms[:, :o] = 0.5 * (y_A + y_B)
+    terms[:, o : 2 * o] = 0.5 * (np.square(y_A) + np.square(y_B))
+    first, total = (part.reshape(n, o, k) for part in np.split(terms[:, 2 * o :], 2, axis=1))
+    np.multiply(y_B[..., None], change, out=first)
+    np.multiply(0.5 * change, change, out=total)
     chosen = rng.integers(n, size=(resamples, n)) + n * np.arange(resamples)[:, None]
-    weights = np.bincount(chosen.ravel(), minlength=n * resamples).reshape(resamples, n) / n
-    again, first_again, total_again = _moments(terms, weights)
-    resampled = Resampled(again, first_again, total_again - first_again)
-    return Parts(mean, variance[0], first[0], total[0] - first[0], resampled)
-
-
-def _moments(terms: tuple[Array, ...], weights: Array) -> tuple[Array, Array, Array]:
-    """Variance (b, o), V_i and VT_i (b, o, k) under weights (b, n) of the rows."""
-    mean, square, first, total = (
-        (weights @ term.reshape(len(term), -1)).reshape(len(weights), *term.shape[1:]) for term in terms
-    )
-    return square - np.square(mean), first, total
+    counts = np.bincount(chosen.ravel(), minlength=n * resamples).reshape(resamples, n)
+    moments = np.vstack([np.ones(n), counts]) @ terms / n
+    means, squares = moments[:, :o], moments[:, o : 2 * o]
+    first, total = (part.reshape(-1, o, k) for part in np.split(moments[:, 2 * o :], 2, axis=1))
+    variance, interaction = squares - np.square(means), total - first
+    resampled = Resampled(variance[1:], first[1:], interaction[1:])
+    return Parts(mean, variance[0], first[0], interaction[0], resampled)
 
 
 RESAMPLES = 100
