@@ -266,15 +266,12 @@ class Chain:
         return C_nb
 
     def exchanged(self, angles: ArrayLike, errors: ArrayLike, others: ArrayLike) -> Array:
-        """Attitudes (k, n, 3, 3) with one of the ``errors`` (n, k) after the other taken from ``others`` (n, k).
-
-        What stands before and behind an error in the chain is multiplied once, not for each error.
-        """
+        """Attitudes (k, n, 3, 3) with one of the ``errors`` (n, k) after the other taken from ``others`` (n, k)."""
         angles, errors = self._checked(angles, errors)
         _, others = self._checked(angles, others)
         C_nb = np.empty((len(self.errors), len(errors), 3, 3))
         turns = [_rotation(*each) for each in self._values(angles, errors)]
-        behind = [np.eye(3)]
+        behind = [np.eye(3)]  # products before and behind an error are made once, not for each error
         for turn in reversed(turns[1:]):
             behind.insert(0, turn @ behind[0])
         before, k = np.eye(3), 0

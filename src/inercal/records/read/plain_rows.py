@@ -117,7 +117,7 @@ def _power(data: Bytes, at: int) -> tuple[int, int]:
 
 @kernel
 def _zeros(data: Bytes, at: int, mark: int) -> int:
-    """How many zeros a number begins with."""
+    """Number of zeros that a number begins with."""
     zeros = 0
     while at < len(data) and (data[at] == 48 or data[at] == mark):
         zeros += data[at] == 48
