@@ -140,8 +140,9 @@ def measure(
         filtered = filter_result.estimate(zeroed, of, settings.estimator.smooth)
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
-        findings = [*findings, *diagnose(*fused_case(zeroed, settings), findings, settings.band.every)]
-        findings += [*of_delay(delay, of, filtered), *unseen(zeroed, of)]
+        found = diagnose(*fused_case(zeroed, settings), findings, settings.band.every)
+        named = any(each.harm for each in found)
+        findings = [*findings, *found, *of_delay(delay, of, filtered), *unseen(zeroed, of, settings, named)]
         findings += of_flexure(zeroed, of, filtered, settings)
         known_u = angles.u[np.isfinite(angles.u)]
         if len(known_u):

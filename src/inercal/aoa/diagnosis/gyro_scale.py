@@ -1,7 +1,9 @@
 """The gyro's scale by a recording alone, beside what its prior allows.
 
 Under a prior that is ten times as wide the fusion tells what the recording itself says: 1 / P less the information of
-that prior. Where this contradicts the usual prior, the gyro is no such gyro, and a wider one is taken.
+that prior. Where this contradicts the usual prior, the gyro is no such gyro, and a wider one is taken; but not where a
+constant error of the accelerometers explains the recording better: an axis that is turned looks like a scale, and with
+a wider prior nothing would contradict it.
 """
 
 from __future__ import annotations
@@ -14,11 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.diagnosis.effect import effect
+from inercal.aoa.diagnosis.fit_quality import Case, stretch
+from inercal.aoa.diagnosis.small import beside_a_scale
+from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings, Prior
+from inercal.estimate.hypotheses import CLEAR, Fitted
 from inercal.findings import EVERYTHING, Finding
 
 _WIDER = 10.0
@@ -72,16 +78,44 @@ def of_recording(stretches: Sequence[Recording], settings: AoaSettings) -> AoaSe
     for part in stretches:
         found = alone(part, problem(settings, part.spatial))
         if found is not None and found.sigmas > LIMITS.other_scale_sigmas:
-            return replace(settings, prior=replace(settings.prior, gyro_scale=LIMITS.unseen_scale))
+            return settings if elsewhere(part, settings) else _of_any_gyro(settings)
     return settings
 
 
-def of_prior(part: Recording, of: FilterProblem, found: Scale | None) -> list[Finding]:
-    """``prior_suspect``: the scale that a stretch shows contradicts the prior, and the angle would be another one."""
-    if found is None or not found.sigmas > LIMITS.prior_sigmas:
+def _of_any_gyro(settings: AoaSettings) -> AoaSettings:
+    """The study with the scale of a gyro that was never calibrated."""
+    return replace(settings, prior=replace(settings.prior, gyro_scale=LIMITS.unseen_scale))
+
+
+def elsewhere(recording: Recording, settings: AoaSettings) -> Fitted[Case] | None:
+    """The constant error of the accelerometers, of gravity or attitude that explains a stretch better than another
+    scale of the gyro does; None where none does."""
+    rows, settings = fused_case(recording, settings)
+    part = stretch(rows)
+    return beside_a_scale((part, settings), (part, _of_any_gyro(settings)))
+
+
+def _harms(error: Fitted[Case], part: Recording, settings: AoaSettings) -> bool:
+    """True where a constant error is sure, and the angle would be another one without it."""
+    rows, settings = fused_case(part, settings)
+    plain, without = (
+        estimate(of, problem(study, of.spatial)) for of, study in ((stretch(rows), settings), error.case)
+    )
+    cost = effect(plain, without, error.case[0].t)
+    return bool((np.abs(error.values) > CLEAR * error.u).all()) and cost is not None and bool(cost.harm)
+
+
+def of_prior(
+    part: Recording, of: FilterProblem, settings: AoaSettings, found: Scale | None, named: bool
+) -> list[Finding]:
+    """``prior_suspect``: the scale that a stretch shows contradicts the prior, and the angle would be another one; or
+    what explains it better, unless it is ``named`` already."""
+    if found is None or not found.sigmas > LIMITS.other_scale_sigmas:
         return []
+    if (better := elsewhere(part, settings)) is not None and _harms(better, part, settings):
+        return [] if named else [better.finding]
     cost = effect(estimate(part, of), estimate(part, _wider(of)), part.t)
-    if cost is None or not cost.harm:
+    if found.sigmas <= LIMITS.prior_sigmas or cost is None or not cost.harm:
         return []
     k = of.places.scale
     text = (

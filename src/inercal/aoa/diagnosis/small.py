@@ -52,34 +52,71 @@ def small_errors(case: Case) -> tuple[Fits[Case], Case]:
     return search(case, constant_errors, JUDGE, 1.0, LIMITS.small_errors, choose=_most_explaining)
 
 
+def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
+    """The constant error of accelerometers, gravity, yaw or roll that explains a case best, whether the case fits or
+    not; None where none is likelier than the ``other`` case, that of another scale of the gyro.
+
+    Innovations of a filter are independent, so the sum of their squares is what the likelihood differs by.
+    """
+
+    def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
+        return _least(fits, _squares, LIMITS.alike_squares)
+
+    found, then = search(case, _of_accelerometers, JUDGE, 1.0, 1, choose=likeliest)
+    return found[-1] if found and _squares(then) < _squares(other) else None
+
+
+def _squares(case: Case) -> float:
+    """Sum of the squared innovations over their variances."""
+    return float(np.nansum(np.square(JUDGE.residuals(case))))
+
+
 def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-    """The fit with the least misfit, with others that have hardly more; None where it takes too little away."""
+    """The fit with the least misfit; None where it takes too little away."""
+    best = _least(fits, JUDGE.misfit, LIMITS.small_alike_misfit)
+    most = (1.0 - LIMITS.explained_share) * JUDGE.misfit(case)
+    return None if best is None or JUDGE.misfit(best[-1].case) > most else best
+
+
+def _least(fits: Iterator[Fits[Case]], misfit: Callable[[Case], float], alike: float) -> Fits[Case] | None:
+    """The fit with the least misfit, with others that have hardly more."""
     likeliest = enumerate(itertools.islice(fits, LIMITS.fitted_errors))
-    by_misfit = sorted((JUDGE.misfit(fit[-1].case), k, fit) for k, fit in likeliest)
-    if not by_misfit or by_misfit[0][0] > (1.0 - LIMITS.explained_share) * JUDGE.misfit(case):
+    by_misfit = sorted((misfit(fit[-1].case), k, fit) for k, fit in likeliest)
+    if not by_misfit:
         return None
     least, _, best = by_misfit[0]
-    alike = tuple(fit[-1] for misfit, _, fit in by_misfit[1:] if misfit < least + LIMITS.small_alike_misfit)
-    return [*best[:-1], replace(best[-1], alike=alike)]
+    others = tuple(fit[-1] for of_fit, _, fit in by_misfit[1:] if of_fit < least + alike)
+    return [*best[:-1], replace(best[-1], alike=others)]
 
 
 def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     """Hypotheses of constant errors; none where the case fits."""
     recording, settings = case
-    now = fit_quality(recording, settings)
-    if now.fits:
+    if fit_quality(recording, settings).fits:
         return
-    there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
-    for error in (_axis, _scale, _bias, _position):
-        for k in there:
-            yield error(settings, k)
+    yield from _of_accelerometers(case)
+    for k in _there(recording):
+        yield _position(settings, k)
     if np.isfinite(recording.gyro).any():
         yield _gyro_bias()
     yield _pivot()
+
+
+def _of_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
+    """Hypotheses of constant errors that change what the accelerometers say, and not with the angular acceleration."""
+    recording, settings = case
+    for error in (_axis, _scale, _bias):
+        for k in _there(recording):
+            yield error(settings, k)
     yield _gravity(settings)
     if not recording.spatial:
-        yield _yaw(now.theta)
+        yield _yaw(fit_quality(recording, settings).theta)
         yield _roll()
+
+
+def _there(recording: Recording) -> list[int]:
+    """Numbers of the accelerometers that have readings."""
+    return [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
 
 
 def _error(
@@ -108,15 +145,20 @@ def _axis(settings: AoaSettings, k: int) -> Hypothesis[Case]:
     name, nominal = settings.layout.names[k], float(settings.layout.angle[k])
 
     def without(recording: Recording, settings: AoaSettings, value: float) -> Case:
-        angle = settings.layout.angle.copy()
-        angle[k] += value
-        return recording, replace(settings, layout=replace(settings.layout, angle=angle))
+        return recording, with_axis(settings, k, value)
 
     def says(value: float) -> str:
         advice = f'write angle = "{math.degrees(nominal + value):.4g} deg" under [sensors.{name}]'
         return f"the axis of {name} looks turned by {math.degrees(value):.3g} deg: {advice}"
 
     return _error(f"axis {name}", "unmodelled", without, says, 1e-5, 0.7)
+
+
+def with_axis(settings: AoaSettings, k: int, value: float) -> AoaSettings:
+    """A study with the axis of a sensor turned by the value [rad]."""
+    angle = settings.layout.angle.copy()
+    angle[k] += value
+    return replace(settings, layout=replace(settings.layout, angle=angle))
 
 
 def _scale(settings: AoaSettings, k: int) -> Hypothesis[Case]:

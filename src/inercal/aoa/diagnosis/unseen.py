@@ -13,26 +13,34 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.aoa.diagnosis.effect import Effect, effect
-from inercal.aoa.diagnosis.fit_quality import stretch
+from inercal.aoa.diagnosis.fit_quality import fit_quality, stretch
 from inercal.aoa.diagnosis.gyro_scale import Scale, alone, of_prior
+from inercal.aoa.diagnosis.small import with_axis
+from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.aoa.fusion.problem import FilterProblem
+from inercal.aoa.fusion.problem import problem as posed
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
+from inercal.aoa.settings import AoaSettings
 from inercal.findings import Finding
 from inercal.units import STANDARD_GRAVITY
 
 
-def unseen(recording: Recording, problem: FilterProblem) -> list[Finding]:
-    """``prior_suspect`` where the gyro's scale contradicts its prior; else ``weak_test``: what would shift the angle by
-    over twice u, unnoticed: a gyro's scale that is off by `Limits.unseen_scale`, or as far as the recording does not
-    contradict it, and a bias that drifts by `Limits.unseen_drift` where no random walk is stated."""
+def unseen(
+    recording: Recording, problem: FilterProblem, settings: AoaSettings, named: bool = False
+) -> list[Finding]:
+    """``prior_suspect`` where the gyro's scale contradicts its prior, or what explains that better, unless constant
+    errors are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed: a gyro's
+    scale that is off by `Limits.unseen_scale`, or as far as the recording does not contradict it, a bias that drifts by
+    `Limits.unseen_drift` where no random walk is stated, and an axis that is turned by `Limits.unseen_axis`."""
     part = stretch(recording)
     own = alone(part, problem)
-    if wrong := of_prior(part, problem, own):
+    if wrong := of_prior(part, problem, settings, own, named):
         return wrong
     plain = estimate(part, problem)
-    return [*_scale(part, problem, plain, own), *_drift(part, problem, plain)]
+    found = [*_scale(part, problem, plain, own), *_drift(part, problem, plain)]
+    return found if named else [*found, *_axis(recording, settings)]
 
 
 def _told(part: Recording, off: Recording, problem: FilterProblem, plain: FilterResult) -> Effect | None:
@@ -80,5 +88,31 @@ def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list
         f"nothing in this motion would show a bias of {name} that drifts by {drift:g} mg, which shifts the "
         f"angle by {math.degrees(shift):.2g} deg, {found.ratio:.2g} times u: state accelerometer_walk under [noise] "
         "where it may"
+    )
+    return [Finding("weak_test", text)]
+
+
+def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
+    """The accelerometer whose axis shifts the angle most where it is turned and the recording still fits."""
+    case = fused_case(recording, settings)
+    part = stretch(case[0])
+    if not fit_quality(part, case[1]).fits:
+        return []
+    plain = estimate(part, posed(case[1], part.spatial))
+    worst: tuple[float, str, Effect] | None = None
+    for k, name in enumerate(settings.layout.names):
+        turned = with_axis(case[1], k, LIMITS.unseen_axis)
+        found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
+        if found is None or not found.ratio > LIMITS.unseen_sigmas:
+            continue
+        if (worst is None or found.shift > worst[0]) and fit_quality(part, turned).fits:
+            worst = found.shift, name, found
+    if worst is None:
+        return []
+    shift, name, found = worst
+    text = (
+        f"nothing in this motion would show an axis of {name} that is turned by "
+        f"{math.degrees(LIMITS.unseen_axis):g} deg, which shifts the angle by {math.degrees(shift):.2g} deg, "
+        f"{found.ratio:.2g} times u: fit the axes to a reference angle, or move through more angles"
     )
     return [Finding("weak_test", text)]
