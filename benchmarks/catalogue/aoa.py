@@ -123,8 +123,14 @@ def study_of(**layout):
     return replace(STUDY, layout=replace(STUDY.layout, **layout))
 
 
-AXES, FAR = np.array([0.0, 0.3 * DEG, 0.0]), np.array([0.0, 0.0, 0.02])
+def turned(sensor: int, degrees: float):
+    """The study with an axis that is not where it says."""
+    return {"study": study_of(angle=STUDY.layout.angle + degrees * DEG * np.eye(3)[sensor])}
+
+
+FAR = np.array([0.0, 0.0, 0.02])
 SCALE, DRIFT = "a gyro whose scale is off", "a bias of a\\d that drifts"
+TURN = "an axis of a\\d that is turned"
 
 
 def faults() -> dict[str, Fault]:
@@ -138,10 +144,15 @@ def faults() -> dict[str, Fault]:
             f"{name}, {kind}": Fault(partial(by_file, change, kind, **more), told)
             for name, change, told, more in (
                 ("gyro scale by 1 %", scaled(1.01), SCALE, {}),
+                ("gyro scale by 0.4 %", scaled(1.004), SCALE, {}),
                 ("gyro scale by 0.2 %", scaled(1.002), SCALE, {}),
                 ("bias of a2 drifts by 1 mg", drifting, DRIFT, {}),
                 ("K2 of 100 ug/g^2 under 3 g of vibration", squared, "rectif", {"more": vibration}),
-                ("axis of a2 by 0.3 deg", same, "", {"study": study_of(angle=STUDY.layout.angle + AXES)}),
+                ("axis of a2 by 0.3 deg", same, TURN, turned(1, 0.3)),
+                ("axis of a2 by 0.1 deg", same, TURN, turned(1, 0.1)),
+                ("axis of a2 by 0.05 deg", same, TURN, turned(1, 0.05)),
+                ("axis of a1 by 0.3 deg", same, TURN, turned(0, 0.3)),
+                ("axis of a1 by 0.1 deg", same, TURN, turned(0, 0.1)),
                 ("place of a3 by 20 mm", same, "", {"study": study_of(r=STUDY.layout.r + FAR)}),
                 ("places in millimetres", same, "", {"study": study_of(r=1000.0 * STUDY.layout.r)}),
                 ("gravity wrong by 1000 ppm", same, "", {"study": replace(STUDY, site=Site(1.001 * G))}),
