@@ -9,6 +9,7 @@ import pytest
 from sting_study import BASE, DEG, G, study
 
 import inercal as ic
+from inercal.aoa.runs.run_table import read_runs_table
 from inercal.aoa.runs.summary import error_terms
 from inercal.aoa.runs.tare import WindOff, interpolated
 from inercal.aoa.settings import MotionPlan
@@ -207,6 +208,7 @@ def test_the_papers_way_takes_the_tare_off_its_readings(entry, capsys):
 
 REFUSED = {
     "role\nup": "found no column file",
+    "file,role,begin [m]\nup1.csv,up,1": "begin: found '1 m', which is of length",
     "file,role,color\nup1.csv,up,red": "found the column 'color', expected file, role, angle",
     "file,role\nnone.csv,up": "row 1: file: found none.csv, which is not there",
     "file,role\nup1.csv,sideways": "role: found 'sideways', expected wind-off, up, down, run",
@@ -227,6 +229,25 @@ def test_one_sentence_for_what_is_wrong(entry, text, words):
     with pytest.raises(InputError, match=words) as error:
         ic.runs(entry / "bad.csv", entry / "aoa.toml")
     assert "\n" not in str(error.value)
+
+
+def test_a_unit_in_the_head_of_a_column_is_that_of_its_cells(tmp_path):
+    """The same table with units in the cells, and in the heads."""
+    for name in ("off.csv", "sine.csv"):
+        (tmp_path / name).touch()
+    tables = (
+        "file,role,angle,begin,amplitude,frequency\n"
+        "off.csv,wind-off,0.000(2) deg,0 min,,\nsine.csv,run,,5 min,10 deg,1 Hz",
+        "file,role,angle [deg],begin [min],amplitude [deg],frequency [Hz]\n"
+        "off.csv,wind-off,0.000(2),0,,\nsine.csv,run,,5,10,1",
+    )
+    found = []
+    for text in tables:
+        (tmp_path / "runs.csv").write_text(text)
+        off, sine = read_runs_table(tmp_path / "runs.csv").runs
+        found.append((off.angle.value, off.angle.u, sine.begin, sine.amplitude, sine.frequency))
+    assert found[0] == found[1]
+    assert found[0] == pytest.approx((0.0, np.radians(0.002), 300.0, np.radians(10.0), 1.0))
 
 
 def test_a_table_beside_files_is_refused(entry, capsys):

@@ -8,7 +8,8 @@
     off2.csv,wind-off,0.000(2) deg,20 min,,
 
 ``angle`` is the known one of a wind-off, with its standard uncertainty; ``begin`` the time at which the recording
-began; ``amplitude`` and ``frequency`` those of a driven oscillation.
+began; ``amplitude`` and ``frequency`` those of a driven oscillation. A unit may stand in the head of its column,
+``amplitude [deg]``, in the place of the cells.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def read_runs_table(path: str | Path) -> RunTable:
         raise InputError(path, "cannot be read as text, expected a table such as file,role") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     rows = list(csv.DictReader(io.StringIO("\n".join(lines)), skipinitialspace=True))
-    heads = [name.strip() for name in lines[0].split(",")] if lines else []
+    heads = [_titled(name)[0] for name in lines[0].split(",")] if lines else []
     for name in heads:
         if name not in _COLUMNS:
             raise InputError(path, f"found the column {shown(name)}, expected {', '.join(_COLUMNS)}")
@@ -95,11 +96,21 @@ def read_runs_table(path: str | Path) -> RunTable:
     return RunTable(runs, source)
 
 
+def _titled(title: str) -> tuple[str, str]:
+    """Name and unit of a column, empty where its head has none."""
+    name, _, unit = title.strip().rstrip("]").partition("[")
+    return name.strip(), unit.strip()
+
+
 def _run(row: Mapping[str | None, object], table: Path, where: str) -> Run:
     """One row."""
     if None in row:
         raise InputError(where, "found more values than columns, expected one for each")
-    cells = {str(name).strip(): str(cell or "").strip() for name, cell in row.items()}
+    cells = {}
+    for title, cell in row.items():
+        name, unit = _titled(str(title))
+        text = str(cell or "").strip()
+        cells[name] = f"{text} {unit}" if text and unit else text
     if not cells["file"]:
         raise InputError(where, "file: missing, expected the name of a recording")
     path = table.parent / cells["file"]
