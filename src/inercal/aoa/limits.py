@@ -96,6 +96,9 @@ class Limits:
     longest_arm: float = 3.0
     """Lever arm [m] that none of a model exceeds."""
 
+    impossible_arm: float = 10.0
+    """Lever arm [m] that is named whatever the motion shows of it: no tunnel has room for it."""
+
     noise_order: int = 6
     """Order of the differences by which noise is told from motion."""
 

@@ -73,7 +73,8 @@ def implausible(recording: Recording, settings: AoaSettings) -> list[Finding]:
     part = stretch(recording)
     now = fit_quality(part, settings)
     if now.misfit <= LIMITS.sound_misfit:
-        return _on_its_back(recording, settings) if _upright(now) <= LIMITS.upside_down_cosine else []
+        back = _on_its_back(recording, settings) if _upright(now) <= LIMITS.upside_down_cosine else []
+        return [*_far_away(settings), *back]
     return [fault.finding for fault in _explaining((part, settings), now)]
 
 
@@ -131,6 +132,20 @@ def _upright(quality: FitQuality) -> float:
     """Cosine of theta in all but one in a hundred rows or less; the largest is the most upright."""
     cosine = np.cos(quality.theta[np.isfinite(quality.theta)])
     return float(np.quantile(cosine, 0.99)) if cosine.size else 1.0
+
+
+def _far_away(settings: AoaSettings) -> list[Finding]:
+    """``unit_suspect``: an accelerometer further from the pivot than any model is long, which slow motion hides."""
+    layout = settings.layout
+    k = int(np.argmax(np.abs(layout.r)))
+    arm = float(layout.r[k])
+    if not abs(arm) > LIMITS.impossible_arm:
+        return []
+    text = (
+        f"{layout.names[k]} is stated {abs(arm):g} m from the pivot, where arms of models are "
+        f"shorter than {LIMITS.impossible_arm:g} m: write r with its unit"
+    )
+    return [Finding("unit_suspect", text, harm=EVERYTHING)]
 
 
 def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:

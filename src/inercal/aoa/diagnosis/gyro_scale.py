@@ -2,8 +2,8 @@
 
 Under a prior that is ten times as wide the fusion tells what the recording itself says: 1 / P less the information of
 that prior. Where this contradicts the usual prior, the gyro is no such gyro, and a wider one is taken; but not where a
-constant error of the accelerometers explains the recording better: an axis that is turned looks like a scale, and with
-a wider prior nothing would contradict it.
+constant error that is none of the gyro explains the recording better: a turned axis or a wrong position looks like a
+scale, and with a wider prior nothing would contradict it.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ def _of_any_gyro(settings: AoaSettings) -> AoaSettings:
 
 
 def elsewhere(recording: Recording, settings: AoaSettings) -> Fitted[Case] | None:
-    """The constant error of the accelerometers, of gravity or attitude that explains a stretch better than another
-    scale of the gyro does; None where none does."""
+    """The constant error, none of the gyro, that explains a stretch better than another scale of the gyro does; None
+    where none does."""
     rows, settings = fused_case(recording, settings)
     part = stretch(rows)
     return beside_a_scale((part, settings), (part, _of_any_gyro(settings)))

@@ -20,7 +20,7 @@ from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, search
+from inercal.estimate.hypotheses import SHOWN, Fits, Fitted, Hypothesis, search
 from inercal.findings import EVERYTHING
 from inercal.units import STANDARD_GRAVITY, Quantity, parse_unit
 
@@ -53,16 +53,16 @@ def small_errors(case: Case) -> tuple[Fits[Case], Case]:
 
 
 def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
-    """The constant error of accelerometers, gravity, yaw or roll that explains a case best, whether the case fits or
-    not; None where none is likelier than the ``other`` case, that of another scale of the gyro.
+    """The constant error, none of the gyro, that explains a case best, whether the case fits or not; None where none is
+    likelier than the ``other`` case, that of another scale of the gyro.
 
     Innovations of a filter are independent, so the sum of their squares is what the likelihood differs by.
     """
 
     def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-        return _least(fits, _squares, LIMITS.alike_squares)
+        return _least(itertools.islice(fits, SHOWN + 1), _squares, LIMITS.alike_squares)
 
-    found, then = search(case, _of_accelerometers, JUDGE, 1.0, 1, choose=likeliest)
+    found, then = search(case, _beside_the_gyro, JUDGE, 1.0, 1, choose=likeliest)
     return found[-1] if found and _squares(then) < _squares(other) else None
 
 
@@ -94,29 +94,23 @@ def constant_errors(case: Case) -> Iterator[Hypothesis[Case]]:
     recording, settings = case
     if fit_quality(recording, settings).fits:
         return
-    yield from _of_accelerometers(case)
-    for k in _there(recording):
-        yield _position(settings, k)
+    yield from _beside_the_gyro(case)
     if np.isfinite(recording.gyro).any():
         yield _gyro_bias()
-    yield _pivot()
 
 
-def _of_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
-    """Hypotheses of constant errors that change what the accelerometers say, and not with the angular acceleration."""
+def _beside_the_gyro(case: Case) -> Iterator[Hypothesis[Case]]:
+    """Hypotheses of constant errors that are none of the gyro."""
     recording, settings = case
-    for error in (_axis, _scale, _bias):
-        for k in _there(recording):
+    there = [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
+    for error in (_axis, _scale, _bias, _position):
+        for k in there:
             yield error(settings, k)
+    yield _pivot()
     yield _gravity(settings)
     if not recording.spatial:
         yield _yaw(fit_quality(recording, settings).theta)
         yield _roll()
-
-
-def _there(recording: Recording) -> list[int]:
-    """Numbers of the accelerometers that have readings."""
-    return [k for k in range(recording.acc.shape[1]) if np.isfinite(recording.acc[:, k]).any()]
 
 
 def _error(
@@ -213,7 +207,7 @@ def _position(settings: AoaSettings, k: int) -> Hypothesis[Case]:
         return f'{what}: write r = "{nominal + value:.4g} m" under [sensors.{name}]'
 
     return _error(
-        f"position {name}", "prior_suspect", lambda r, s, x: (r, _further_ahead(s, k, x)), says, 1e-4, 1.0
+        f"position {name}", "prior_suspect", lambda r, s, x: (r, further_ahead(s, k, x)), says, 1e-4, 1.0
     )
 
 
@@ -225,10 +219,10 @@ def _pivot() -> Hypothesis[Case]:
         return f"{what}: correct the positions r of all sensors"
 
     every = slice(None)
-    return _error("pivot", "prior_suspect", lambda r, s, x: (r, _further_ahead(s, every, x)), says, 1e-4, 1.0)
+    return _error("pivot", "prior_suspect", lambda r, s, x: (r, further_ahead(s, every, x)), says, 1e-4, 1.0)
 
 
-def _further_ahead(settings: AoaSettings, k: int | slice, value: float) -> AoaSettings:
+def further_ahead(settings: AoaSettings, k: int | slice, value: float) -> AoaSettings:
     """A study with a sensor, or all of them, further ahead by the value [m]."""
     r = settings.layout.r.copy()
     r[k] += value
