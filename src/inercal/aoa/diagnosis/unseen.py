@@ -101,12 +101,13 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     plain = estimate(part, posed(case[1], part.spatial))
     worst: tuple[float, str, Effect] | None = None
     for k, name in enumerate(settings.layout.names):
-        turned = with_axis(case[1], k, LIMITS.unseen_axis)
-        found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
-        if found is None or not found.ratio > LIMITS.unseen_sigmas:
-            continue
-        if (worst is None or found.shift > worst[0]) and fit_quality(part, turned).fits:
-            worst = found.shift, name, found
+        for size in (LIMITS.unseen_axis, -LIMITS.unseen_axis):  # it may be off already, and back is no error
+            turned = with_axis(case[1], k, size)
+            found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
+            if found is None or not found.ratio > LIMITS.unseen_sigmas:
+                continue
+            if (worst is None or found.shift > worst[0]) and fit_quality(part, turned).fits:
+                worst = found.shift, name, found
     if worst is None:
         return []
     shift, name, found = worst
