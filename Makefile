@@ -29,8 +29,8 @@ quick: .venv/dev/installed
 test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
-	$(DEV)/mypy
-	$(DEV)/python -m pytest -n 2 --dist worksteal -m "not campaign" --slow-rule list
+	@$(DEV)/mypy & types=$$!; $(DEV)/python -m pytest -n 2 --dist worksteal -m "not campaign" --slow-rule list; \
+	    tests=$$?; wait $$types && exit $$tests
 
 # The full numbers of runs, of which `make test` has short versions.
 campaign: .venv/dev/installed
