@@ -70,8 +70,9 @@ def cache_folder() -> Path | None:
 def kernel(function: F) -> F:
     """Compile a function with numba (nopython, no GIL, no fastmath), cached on disk where possible.
 
-    It neither makes an array nor calls a kernel that returns one, and counts no references to arrays: counting took
-    up to a third of a filter's time. A kernel that does is `allocating`.
+    It counts no references to arrays, which took up to a third of a filter's time. So it must not make an array (nor
+    call functions of NumPy that do, such as ``np.median``), nor return one, alone or in a tuple, nor call a kernel that
+    returns one: numba does not always notice, and memory is lost or freed too soon. Such a kernel is `allocating`.
     """
     return _compiled(function, "never", counting=False)
 

@@ -141,8 +141,9 @@ def measure(
         angles = by_fusion(zeroed, settings, of, filtered)
         progress("looking for faults")
         found = diagnose(*fused_case(zeroed, settings), findings, settings.band.every)
-        named = any(each.harm for each in found)
-        findings = [*findings, *found, *of_delay(delay, of, filtered), *unseen(zeroed, of, settings, named)]
+        findings += found
+        named = any(each.harm and not each.code.endswith("_scatter") for each in findings)
+        findings += [*of_delay(delay, of, filtered), *unseen(zeroed, of, settings, named)]
         findings += of_flexure(zeroed, of, filtered, settings)
         known_u = angles.u[np.isfinite(angles.u)]
         if len(known_u):

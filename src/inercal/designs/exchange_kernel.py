@@ -109,8 +109,8 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
 
 @allocating
 def next_exchange(state: State, chosen: NDArray[np.intp], k: int, taken: Mask) -> tuple[int, int]:
-    """The first place of a design ``chosen`` (n,), from k on and around, in which an exchange improves it by more than
-    rounding, and the candidate for it; -1 where none does."""
+    """The first place of a design ``chosen`` (n,), from k on and then from 0, in which an exchange improves it by more
+    than rounding, and the candidate for it; -1 where none does."""
     n = len(chosen)
     for step in range(n):
         place = (k + step) % n

@@ -2,8 +2,8 @@
 
 Under a prior that is ten times as wide the fusion tells what the recording itself says: 1 / P less the information of
 that prior. Where this contradicts the usual prior, the gyro is no such gyro, and a wider one is taken; but not where a
-constant error that is none of the gyro explains the recording better: a turned axis or a wrong position looks like a
-scale, and with a wider prior nothing would contradict it.
+constant error of something else explains the recording better: a turned axis or a wrong position looks like a scale,
+and with a wider prior nothing would contradict it.
 """
 
 from __future__ import annotations
@@ -78,21 +78,26 @@ def of_recording(stretches: Sequence[Recording], settings: AoaSettings) -> AoaSe
     for part in stretches:
         found = alone(part, problem(settings, part.spatial))
         if found is not None and found.sigmas > LIMITS.other_scale_sigmas:
-            return settings if elsewhere(part, settings) else _of_any_gyro(settings)
+            return settings if elsewhere(part, settings) else _with_scale(settings, LIMITS.unseen_scale)
     return settings
 
 
-def _of_any_gyro(settings: AoaSettings) -> AoaSettings:
-    """The study with the scale of a gyro that was never calibrated."""
-    return replace(settings, prior=replace(settings.prior, gyro_scale=LIMITS.unseen_scale))
+def _with_scale(settings: AoaSettings, size: float) -> AoaSettings:
+    """The study with another prior of the gyro's scale."""
+    return replace(settings, prior=replace(settings.prior, gyro_scale=size))
 
 
 def elsewhere(recording: Recording, settings: AoaSettings) -> Fitted[Case] | None:
-    """The constant error, none of the gyro, that explains a stretch better than another scale of the gyro does; None
-    where none does."""
+    """The constant error of something else that explains a stretch better than another scale of the gyro does, and
+    without which the scale no longer contradicts its prior; None where none does."""
     rows, settings = fused_case(recording, settings)
     part = stretch(rows)
-    return beside_a_scale((part, settings), (part, _of_any_gyro(settings)))
+    wider = _with_scale(settings, _WIDER * settings.prior.gyro_scale)
+    better = beside_a_scale((part, settings), (part, wider))
+    if better is None:
+        return None
+    left = alone(better.case[0], problem(better.case[1], part.spatial))
+    return better if left is None or left.sigmas <= LIMITS.other_scale_sigmas else None
 
 
 def _harms(error: Fitted[Case], part: Recording, settings: AoaSettings) -> bool:
@@ -105,15 +110,13 @@ def _harms(error: Fitted[Case], part: Recording, settings: AoaSettings) -> bool:
     return bool((np.abs(error.values) > CLEAR * error.u).all()) and cost is not None and bool(cost.harm)
 
 
-def of_prior(
-    part: Recording, of: FilterProblem, settings: AoaSettings, found: Scale | None, named: bool
-) -> list[Finding]:
+def of_prior(part: Recording, of: FilterProblem, settings: AoaSettings, found: Scale | None) -> list[Finding]:
     """``prior_suspect``: the scale that a stretch shows contradicts the prior, and the angle would be another one; or
-    what explains it better, unless it is ``named`` already."""
+    what explains it better."""
     if found is None or not found.sigmas > LIMITS.other_scale_sigmas:
         return []
     if (better := elsewhere(part, settings)) is not None and _harms(better, part, settings):
-        return [] if named else [better.finding]
+        return [better.finding]
     cost = effect(estimate(part, of), estimate(part, _wider(of)), part.t)
     if found.sigmas <= LIMITS.prior_sigmas or cost is None or not cost.harm:
         return []

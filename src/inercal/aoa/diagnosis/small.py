@@ -53,10 +53,11 @@ def small_errors(case: Case) -> tuple[Fits[Case], Case]:
 
 
 def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
-    """The constant error, none of the gyro, that explains a case best, whether the case fits or not; None where none is
-    likelier than the ``other`` case, that of another scale of the gyro.
+    """The constant error that is not one of the gyro and explains a case best, whether the case fits or not; None where
+    none is likelier than the ``other`` case, that of another scale of the gyro.
 
-    Innovations of a filter are independent, so the sum of their squares is what the likelihood differs by.
+    Innovations of a filter are independent, so likelihoods differ by half the difference of the sums of their squares,
+    but for their variances, which are nearly the same.
     """
 
     def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
@@ -67,8 +68,8 @@ def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
 
 
 def _squares(case: Case) -> float:
-    """Sum of the squared innovations over their variances."""
-    return float(np.nansum(np.square(JUDGE.residuals(case))))
+    """Sum of the squared innovations over their variances; a wild one, or one of a lost angle, counts as large."""
+    return float(np.nan_to_num(np.square(JUDGE.residuals(case)), nan=LIMITS.wild_ratio**2).sum())
 
 
 def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:

@@ -30,13 +30,15 @@ from inercal.units import STANDARD_GRAVITY
 def unseen(
     recording: Recording, problem: FilterProblem, settings: AoaSettings, named: bool = False
 ) -> list[Finding]:
-    """``prior_suspect`` where the gyro's scale contradicts its prior, or what explains that better, unless constant
-    errors are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed: a gyro's
-    scale that is off by `Limits.unseen_scale`, or as far as the recording does not contradict it, a bias that drifts by
-    `Limits.unseen_drift` where no random walk is stated, and an axis that is turned by `Limits.unseen_axis`."""
+    """``prior_suspect`` where the gyro's scale contradicts its prior, or what explains that better, unless other errors
+    than noise are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed.
+
+    That is a gyro's scale that is off by `Limits.unseen_scale`, or as far as the recording does not contradict it, a
+    bias that drifts by `Limits.unseen_drift` where no random walk is stated, an axis turned by `Limits.unseen_axis`.
+    """
     part = stretch(recording)
     own = alone(part, problem)
-    if wrong := of_prior(part, problem, settings, own, named):
+    if not named and (wrong := of_prior(part, problem, settings, own)):
         return wrong
     plain = estimate(part, problem)
     found = [*_scale(part, problem, plain, own), *_drift(part, problem, plain)]

@@ -76,8 +76,13 @@ def read_runs_table(path: str | Path) -> RunTable:
         raise InputError(path, "cannot be read as text, expected a table such as file,role") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     rows = list(csv.DictReader(io.StringIO("\n".join(lines)), skipinitialspace=True))
-    heads = [_titled(name)[0] for name in lines[0].split(",")] if lines else []
-    for name in heads:
+    titles = [_titled(name) for name in lines[0].split(",")] if lines else []
+    heads = [name for name, _ in titles]
+    for name, unit in titles:
+        if heads.count(name) > 1:
+            raise InputError(path, f"found the column {shown(name)} twice, expected it once")
+        if unit and name in ("file", "role"):
+            raise InputError(path, f"found {shown(unit)} as unit of the column {name}, expected none")
         if name not in _COLUMNS:
             raise InputError(path, f"found the column {shown(name)}, expected {', '.join(_COLUMNS)}")
     for needed in ("file", "role"):

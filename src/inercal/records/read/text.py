@@ -180,7 +180,7 @@ def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
 
     places = np.full(layout.width, -1)
     places[list(indices)] = range(len(indices))
-    marks = [layout.delimiter or "\0", layout.decimal or "\0", *(each[0] for each in layout.comments)]
+    marks = [layout.delimiter or "\0", layout.decimal or "0", *(each[0] for each in layout.comments)]
     if any(not mark.isascii() for mark in marks) or len(set(indices)) < len(indices):
         return _looked_at(block, layout, indices)
     marks.insert(2, block.mark.decode())
