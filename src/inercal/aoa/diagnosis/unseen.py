@@ -95,11 +95,10 @@ def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list
 
 
 def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
-    """The accelerometer whose axis shifts the angle most where it is turned and the recording still fits."""
+    """The accelerometer whose axis shifts the angle most where it is turned and the recording fits, or no worse."""
     case = fused_case(recording, settings)
     part = stretch(case[0])
-    if not fit_quality(part, case[1]).fits:
-        return []
+    as_stated = fit_quality(part, case[1]).misfit
     plain = estimate(part, posed(case[1], part.spatial))
     worst: tuple[float, str, Effect] | None = None
     for k, name in enumerate(settings.layout.names):
@@ -108,7 +107,8 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
             found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
             if found is None or not found.ratio > LIMITS.unseen_sigmas:
                 continue
-            if (worst is None or found.shift > worst[0]) and fit_quality(part, turned).fits:
+            then = fit_quality(part, turned)
+            if (worst is None or found.shift > worst[0]) and (then.fits or then.misfit <= as_stated):
                 worst = found.shift, name, found
     if worst is None:
         return []
