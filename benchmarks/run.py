@@ -2,11 +2,11 @@
 
     python benchmarks/run.py [--quick] [--out build/bench]
 
-Writes results.md, results.json and cost.svg. The long campaigns are not in it but for the short ones of `accuracy.py`;
-each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`, `turntable_coverage.py`,
-`selfcal_coverage.py`, `selfcal_robustness.py`, `strapdown_coverage.py`, `aoa_bands.py`, `aoa_endless.py`,
-`faults.py`; so are `long_rows.py`, `workbench_speed.py`, and `workbench_browser.py`, `stream_latency.py` and `live.py`,
-whose figures are of the clock on the wall.
+Writes results.md and results.json, anew after each part, and cost.svg at the end. The long campaigns are not in it but
+for the short ones of `accuracy.py`; each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`,
+`turntable_coverage.py`, `selfcal_coverage.py`, `selfcal_robustness.py`, `strapdown_coverage.py`, `aoa_bands.py`,
+`aoa_endless.py`, `faults.py`; so are `long_rows.py`, `workbench_speed.py`, and `workbench_browser.py`,
+`stream_latency.py` and `live.py`, whose figures are of the clock on the wall.
 """
 
 import argparse
@@ -87,17 +87,18 @@ def as_markdown(results: dict) -> str:
 
 
 def written(results: dict, folder: Path) -> None:
-    """Write the table, the objects and the picture."""
+    """Write the table and the objects."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    (folder / "results.md").write_text(as_markdown(results), encoding="utf-8")
+
+
+def pictured(results: dict, folder: Path) -> None:
+    """Draw the cost against size."""
     from scaling import Curve, drawn
 
-    folder.mkdir(parents=True, exist_ok=True)
     curves = [Curve(**{k: v for k, v in told.items() if k != "slope"}) for told in results["curves"]]
-    for name, text in (
-        ("results.json", json.dumps(results, indent=1) + "\n"),
-        ("results.md", as_markdown(results)),
-        ("cost.svg", drawn(curves)),
-    ):
-        (folder / name).write_text(text, encoding="utf-8")
+    (folder / "cost.svg").write_text(drawn(curves), encoding="utf-8")
 
 
 def main() -> None:
@@ -106,14 +107,21 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("build/bench"))
     options = parser.parse_args()
     moments: list[float] = []
-    results = {
+    results: dict = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": machine(),
-        "rows": {title: objects_of(script, options.quick, moments) for title, script in PARTS.items()},
-        "curves": objects_of("scaling", options.quick, moments),
-        "yardstick": asdict(spread([*moments, yardstick()])),
+        "rows": {},
+        "curves": [],
     }
-    written(results, options.out)
+    for title, script in {**PARTS, "": "scaling"}.items():
+        made = objects_of(script, options.quick, moments)
+        if title:
+            results["rows"][title] = made
+        else:
+            results["curves"] = made
+        results["yardstick"] = asdict(spread([*moments, yardstick()]))
+        written(results, options.out)  # after each part: the next may take minutes, or fail
+    pictured(results, options.out)
     broken = [told["what"] for rows in results["rows"].values() for told in rows if told["holds"] is False]
     print(
         f"{options.out / 'results.md'}: {'all that is promised holds' if not broken else 'does not hold: '}",

@@ -63,6 +63,7 @@ def test_table_objects_and_picture_are_written(quick, tmp_path):
     }
     told = json.loads(json.dumps(told))
     bench.written(told, tmp_path)
+    bench.pictured(told, tmp_path)
     assert json.loads((tmp_path / "results.json").read_text(encoding="utf-8")) == told
     text = (tmp_path / "results.md").read_text(encoding="utf-8")
     rows = [row for part in quick.values() for row in part]
