@@ -47,7 +47,7 @@ coverage: .venv/dev/installed
 docs: .venv/dev/installed
 	$(DEV)/python -m sphinx --builder html --fail-on-warning --quiet --doctree-dir build/doctrees docs build/docs
 
-# Five to fifteen minutes. What it leaves out, the campaigns that are run alone, is named in benchmarks/run.py.
+# Some fifteen minutes. What it leaves out, the campaigns that are run alone, is named in benchmarks/run.py.
 bench: .venv/dev/installed
 	$(DEV)/python benchmarks/run.py --out build/bench
 
