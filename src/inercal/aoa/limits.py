@@ -96,9 +96,6 @@ class Limits:
     longest_arm: float = 3.0
     """Lever arm [m] that none of a model exceeds."""
 
-    impossible_arm: float = 10.0
-    """Lever arm [m] that is named whatever the motion shows of it: no tunnel has room for it."""
-
     noise_order: int = 6
     """Order of the differences by which noise is told from motion."""
 
@@ -369,9 +366,6 @@ class Limits:
     nis_chance: float = 1e-5
     """Chance of a sound recording above that limit, where few innovations scatter."""
 
-    alike_squares: float = 4.0
-    """Difference of the sums of squared innovations under two errors of which neither is likelier."""
-
     unseen_scale: float = 0.01
     """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
 
@@ -380,9 +374,6 @@ class Limits:
 
     unseen_drift: float = 1e-3 * STANDARD_GRAVITY
     """Drift [m/s^2] of an accelerometer's bias over a stretch that is tried: of a sensor that warms up."""
-
-    unseen_axis: float = math.radians(0.05)
-    """Turn of an accelerometer's axis [rad] that is tried: of a mount that was made, and not measured."""
 
     unseen_sigmas: float = 2.0
     """Standard uncertainties by which it then shifts the angle, to be told."""

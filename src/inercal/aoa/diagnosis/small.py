@@ -24,6 +24,9 @@ from inercal.estimate.hypotheses import SHOWN, Fits, Fitted, Hypothesis, search
 from inercal.findings import EVERYTHING
 from inercal.units import STANDARD_GRAVITY, Quantity, parse_unit
 
+ALIKE_SQUARES = 4.0
+"""Difference of the sums of squared innovations under two errors of which neither is likelier."""
+
 
 class Fusion:
     """The fusion as a judge: innovations without a gate and without wild ones, and a misfit that these hardly move."""
@@ -61,7 +64,7 @@ def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
     """
 
     def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-        return _least(itertools.islice(fits, SHOWN + 1), _squares, LIMITS.alike_squares)
+        return _least(itertools.islice(fits, SHOWN + 1), _squares, ALIKE_SQUARES)
 
     found, then = search(case, _beside_the_gyro, JUDGE, 1.0, 1, choose=likeliest)
     return found[-1] if found and _squares(then) < _squares(other) else None

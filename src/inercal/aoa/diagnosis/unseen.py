@@ -26,6 +26,9 @@ from inercal.aoa.settings import AoaSettings
 from inercal.findings import Finding
 from inercal.units import STANDARD_GRAVITY
 
+UNSEEN_AXIS = math.radians(0.05)
+"""Turn of an accelerometer's axis [rad] that is tried: of a mount that was made, and not measured."""
+
 
 def unseen(
     recording: Recording, problem: FilterProblem, settings: AoaSettings, named: bool = False
@@ -34,7 +37,7 @@ def unseen(
     than noise are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed.
 
     That is a gyro's scale that is off by `Limits.unseen_scale`, or as far as the recording does not contradict it, a
-    bias that drifts by `Limits.unseen_drift` where no random walk is stated, an axis turned by `Limits.unseen_axis`.
+    bias that drifts by `Limits.unseen_drift` where no random walk is stated, an axis turned by `UNSEEN_AXIS`.
     """
     part = stretch(recording)
     own = alone(part, problem)
@@ -102,7 +105,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     plain = estimate(part, posed(case[1], part.spatial))
     worst: tuple[float, str, Effect] | None = None
     for k, name in enumerate(settings.layout.names):
-        for size in (LIMITS.unseen_axis, -LIMITS.unseen_axis):  # it may be off already, and back is no error
+        for size in (UNSEEN_AXIS, -UNSEEN_AXIS):  # it may be off already, and back is no error
             turned = with_axis(case[1], k, size)
             found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
             if found is None or not found.ratio > LIMITS.unseen_sigmas:
@@ -115,7 +118,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     shift, name, found = worst
     text = (
         f"nothing in this motion would show an axis of {name} that is turned by "
-        f"{math.degrees(LIMITS.unseen_axis):g} deg, which shifts the angle by {math.degrees(shift):.2g} deg, "
+        f"{math.degrees(UNSEEN_AXIS):g} deg, which shifts the angle by {math.degrees(shift):.2g} deg, "
         f"{found.ratio:.2g} times u: fit the axes to a reference angle, or move through more angles"
     )
     return [Finding("weak_test", text)]
