@@ -112,14 +112,13 @@ def main() -> None:
         "rows": {},
         "curves": [],
     }
-    for title, script in {**PARTS, "": "scaling"}.items():
-        made = objects_of(script, options.quick, moments)
-        if title:
-            results["rows"][title] = made
-        else:
-            results["curves"] = made
+    for title, script in PARTS.items():
+        results["rows"][title] = objects_of(script, options.quick, moments)
         results["yardstick"] = asdict(spread([*moments, yardstick()]))
-        written(results, options.out)  # after each part: the next may take minutes, or fail
+        written(results, options.out)  # the next part may take minutes, or fail
+    results["curves"] = objects_of("scaling", options.quick, moments)
+    results["yardstick"] = asdict(spread([*moments, yardstick()]))
+    written(results, options.out)
     pictured(results, options.out)
     broken = [told["what"] for rows in results["rows"].values() for told in rows if told["holds"] is False]
     print(

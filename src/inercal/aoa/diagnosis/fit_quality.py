@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.fusion.run import State, advance, initial
@@ -98,6 +99,12 @@ def stretch(recording: Recording) -> Recording:
         wild = outlying(np.concatenate([column[1:2], column, column[-2:-1]])) - 1
         column[wild[(wild >= 0) & (wild < len(column))]] = np.nan
     return part
+
+
+def judged(recording: Recording, settings: AoaSettings) -> Case:
+    """The stretch of the rows that are fused, and the study for these, without a band."""
+    rows, settings = fused_case(recording, settings)
+    return stretch(rows), settings
 
 
 def _scatter(read: Sequence[Array]) -> Array:

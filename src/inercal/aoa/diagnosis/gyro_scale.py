@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.aoa.diagnosis.effect import effect
-from inercal.aoa.diagnosis.fit_quality import Case, stretch
+from inercal.aoa.diagnosis.fit_quality import Case, judged
 from inercal.aoa.diagnosis.small import beside_a_scale
-from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.limits import LIMITS
@@ -90,8 +89,7 @@ def _with_scale(settings: AoaSettings, size: float) -> AoaSettings:
 def elsewhere(recording: Recording, settings: AoaSettings) -> Fitted[Case] | None:
     """The constant error of something else that explains a stretch better than another scale of the gyro does, and
     without which the scale no longer contradicts its prior; None where none does."""
-    rows, settings = fused_case(recording, settings)
-    part = stretch(rows)
+    part, settings = judged(recording, settings)
     wider = _with_scale(settings, _WIDER * settings.prior.gyro_scale)
     better = beside_a_scale((part, settings), (part, wider))
     if better is None:
@@ -102,9 +100,8 @@ def elsewhere(recording: Recording, settings: AoaSettings) -> Fitted[Case] | Non
 
 def _harms(error: Fitted[Case], part: Recording, settings: AoaSettings) -> bool:
     """True where a constant error is sure, and the angle would be another one without it."""
-    rows, settings = fused_case(part, settings)
     plain, without = (
-        estimate(of, problem(study, of.spatial)) for of, study in ((stretch(rows), settings), error.case)
+        estimate(rows, problem(study, rows.spatial)) for rows, study in (judged(part, settings), error.case)
     )
     cost = effect(plain, without, error.case[0].t)
     return bool((np.abs(error.values) > CLEAR * error.u).all()) and cost is not None and bool(cost.harm)

@@ -13,10 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.aoa.diagnosis.effect import Effect, effect
-from inercal.aoa.diagnosis.fit_quality import fit_quality, stretch
+from inercal.aoa.diagnosis.fit_quality import fit_quality, judged, stretch
 from inercal.aoa.diagnosis.gyro_scale import Scale, alone, of_prior
 from inercal.aoa.diagnosis.small import with_axis
-from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.aoa.fusion.problem import FilterProblem
 from inercal.aoa.fusion.problem import problem as posed
@@ -99,14 +98,13 @@ def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list
 
 def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     """The accelerometer whose axis shifts the angle most where it is turned and the recording fits, or no worse."""
-    case = fused_case(recording, settings)
-    part = stretch(case[0])
-    as_stated = fit_quality(part, case[1]).misfit
-    plain = estimate(part, posed(case[1], part.spatial))
+    part, settings = judged(recording, settings)
+    as_stated = fit_quality(part, settings).misfit
+    plain = estimate(part, posed(settings, part.spatial))
     worst: tuple[float, str, Effect] | None = None
     for k, name in enumerate(settings.layout.names):
         for size in (UNSEEN_AXIS, -UNSEEN_AXIS):  # it may be off already, and back is no error
-            turned = with_axis(case[1], k, size)
+            turned = with_axis(settings, k, size)
             found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
             if found is None or not found.ratio > LIMITS.unseen_sigmas:
                 continue

@@ -134,6 +134,18 @@ def _blank(data: Bytes, at: int, delimiter: int) -> int:
 
 
 @kernel
+def _digits(data: Bytes, at: int, w: Bits) -> tuple[int, Bits]:
+    """The place behind digits, and the whole number ``w`` with them behind it, which is right up to 19 digits."""
+    while at < len(data):
+        c = int(data[np.uint64(at)])
+        if c < 48 or c > 57:
+            break
+        w = w * _TEN + np.uint64(c - 48)
+        at += 1
+    return at, w
+
+
+@kernel
 def _unwanted(data: Bytes, at: int, delimiter: int, ends: int) -> int:
     """The place behind a field of any plain characters, -1 where it holds others, or none between blanks."""
     begin = at
@@ -159,8 +171,7 @@ def read_rows(
 ) -> tuple[int, int]:
     """Read plain lines of ``data`` (m,) from a place on, until one is not.
 
-    What each byte passes is written out here, which takes a sixth of the time of calling kernels for it. Indices
-    without a sign skip the check for negative ones, which would count from the end.
+    Indices without a sign skip the check for negative ones, which would count from the end.
 
     Parameters
     ----------
@@ -204,25 +215,15 @@ def read_rows(
                 negative = c == 45
                 if negative or c == 43:
                     at += 1
-                w, first, q = np.uint64(0), at, 0
-                while at < end:
-                    c = int(data[np.uint64(at)])
-                    if c < 48 or c > 57:
-                        break
-                    w = w * _TEN + np.uint64(c - 48)
-                    at += 1
+                first, q = at, 0
+                at, w = _digits(data, at, np.uint64(0))
                 digits = at - first
-                if at < end and c == mark:
-                    at += 1
-                    point = at
-                    while at < end:
-                        c = int(data[np.uint64(at)])
-                        if c < 48 or c > 57:
-                            break
-                        w = w * _TEN + np.uint64(c - 48)
-                        at += 1
+                if at < end and data[np.uint64(at)] == mark:
+                    point = at + 1
+                    at, w = _digits(data, point, w)
                     q = point - at
                     digits -= q
+                c = int(data[np.uint64(at)]) if at < end else ends
                 if digits == 0 or (digits > 19 and digits - _zeros(data, first, mark) > 19):
                     return count, begin
                 if at < end and (c == 101 or c == 69):
