@@ -119,6 +119,7 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
     form sin^2; earth rate is there, heading at random.
     """
     faults = faults or Faults()
+    own = rng.spawn(1)[0]  # of the faults, so that the noise is the same without them
     dt = 1 / rate
     start_attitude = rotation([0, 0, rng.uniform(-np.pi, np.pi)]) @ _level(ups[0])
     rates, missed, kicks = [], [], []
@@ -132,7 +133,7 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
             rates.append(_turn(rng, up, ups[k + 1], m, dt))
             lost = np.zeros((m, 3))
             if k == faults.turn_at and faults.turn:
-                across = np.cross(ups[k + 1], rng.normal(size=3))
+                across = np.cross(ups[k + 1], own.normal(size=3))
                 lost = _hump(m, dt)[:, None] * faults.turn * across / np.linalg.norm(across)
             missed.append(lost)
             kicks.append(np.sin(2 * np.pi * np.arange(1, m + 1) / m)[:, None] * rng.uniform(-1, 1, 3))
@@ -141,7 +142,7 @@ def record(rng, made, ups, faults=None, rate=50.0, start=20.0, hold=3.0, turn=2.
     shake = np.zeros((len(w), 3))
     m = round(faults.tremor * rate)
     for _ in range(6 if m else 0):
-        frequency, phase = rng.uniform(1, 6), rng.uniform(0, 2 * np.pi, 3)
+        frequency, phase = own.uniform(1, 6), own.uniform(0, 2 * np.pi, 3)
         shake[:m] += np.sin(2 * np.pi * frequency * np.arange(m)[:, None] * dt + phase) / np.sqrt(3)
     earth = EARTH * np.array([np.cos(LATITUDE), 0, np.sin(LATITUDE)])
     seen = w + np.einsum("nji,j->ni", attitudes, earth) + lost + shake[:, ::-1] * faults.tremor_rate

@@ -13,6 +13,7 @@ from inercal.arrays import Array, short_repr
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding
 from inercal.imu.limits import LIMITS
+from inercal.imu.multiposition.drift import drift_finding
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
 from inercal.imu.multiposition.gyro import GyroFit, fit_gyro
@@ -107,7 +108,9 @@ def calibrate_multiposition(
     else:
         size = k2_size(settings, fitted.scatter.s)
         noise = float(np.mean(poses.noise_variance)), poses.noise_dof
-        findings += squares_finding(fitted.joint, poses.means, uncertainty, settings, size, *noise)
+        drift = drift_finding(fitted.joint, recording, poses.times, uncertainty, *noise)
+        of_k2 = squares_finding(fitted.joint, poses.means, uncertainty, settings, size, *noise)
+        findings += of_k2 if drift is None else [drift]
     estimate = assemble(record, recording, poses, fitted.scatter, fitted.joint, settings, findings)
     return MultipositionCalibration(timed(estimate, clock), recording, poses, fitted.gyro, outliers)
 

@@ -16,7 +16,8 @@ from inercal.estimate.rounding import rounded
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
-from inercal.imu.multiposition.joint import Joint, Scatter, radial
+from inercal.imu.multiposition.joint import Joint, Scatter
+from inercal.imu.multiposition.left_out import Effects, Shown, effects, shown
 from inercal.imu.second_order import SOURCE, k2_finding, shares
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import shown_unit
@@ -56,51 +57,43 @@ def squares_finding(
     `squares_source`, was stated, by more than the whole. ``means`` (n, 3) are the outputs; ``noise`` is the variance
     [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
     """
-    from scipy.special import fdtrc
-
     acc = joint.accelerometer
     if acc.squares:
         return
-    unexplained, shifts = _effects(joint)
-    K = unexplained.T @ unexplained
+    of = _effects(joint)
     allowed = _allowed(acc, means, settings.site.gravity)
     names, unit = joint.names, shown_unit("1/(m/s^2)")
     u = uncertainty.u
     if settings.k2_u is None:
         u = u * np.sqrt(1.0 - shares(names, uncertainty))
-    if allowed and acc.fit.dof > 3:
-        estimate = -np.linalg.solve(K, unexplained.T @ acc.fit.residuals)
-        gained = float(estimate @ K @ estimate)
-        left, dof = (acc.fit.chi2 - gained) / (acc.fit.dof - 3), float(acc.fit.dof - 3)
-        if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
-            left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
-        if left > 0 and fdtrc(3, dof, gained / 3.0 / left) < LIMITS.k2_probability:
-            each_u = np.sqrt(np.diag(np.linalg.inv(K)) * left) / unit[1]
-            words = ", ".join(
-                f"{axis} {' ± '.join(rounded(value, each))}"
-                for axis, value, each in zip("xyz", estimate / unit[1], each_u, strict=True)
-            )
-            harmed = np.abs(shifts @ estimate) > u
-            yield Finding(
-                "unmodelled_k2",
-                f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}) that are not "
-                "fitted: set imu.k2 = true",
-                harm=tuple(name for name, each in zip(names, harmed, strict=True) if each),
-            )
-            return
+    found = shown(joint, of, noise, noise_dof) if allowed else None
+    if found is not None and found.probability < LIMITS.k2_probability:
+        words = ", ".join(
+            f"{axis} {' ± '.join(rounded(value, each))}"
+            for axis, value, each in zip("xyz", found.estimate / unit[1], found.u / unit[1], strict=True)
+        )
+        harmed = np.abs(of.shifts @ found.estimate) > u
+        yield Finding(
+            "unmodelled_k2",
+            f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}) that are not "
+            "fitted: set imu.k2 = true",
+            harm=tuple(name for name, each in zip(names, harmed, strict=True) if each),
+        )
+        return
     cure = "set imu.k2 = true"
     if not allowed:
         cure = f"add poses on the edges and corners between the sides, {LIMITS.poses_with_k2} poses or more, and {cure}"
     yield from k2_finding(names, uncertainty, settings, size, cure)
 
 
-def _effects(joint: Joint) -> tuple[Array, Array]:
-    """Changes by K2 of each axis: of |f| - g beyond what the other coefficients take up (n, 3), and of these (p, 3)."""
-    acc = joint.accelerometer
-    in_force = acc.force_by_squares().reshape(-1, 3)
-    columns = radial(acc) @ in_force
-    J = acc.fit.jacobian
-    return columns - J @ (acc.fit.unit_covariance @ (J.T @ columns)), joint.by_force @ in_force
+def squares_shown(joint: Joint, noise: float, noise_dof: float) -> Shown | None:
+    """What the poses say of K2 that is not fitted; None where it is, or where they say nothing."""
+    return None if joint.accelerometer.squares else shown(joint, _effects(joint), noise, noise_dof)
+
+
+def _effects(joint: Joint) -> Effects:
+    """Effects of K2 of each axis."""
+    return effects(joint, joint.accelerometer.force_by_squares().reshape(-1, 3))
 
 
 def _allowed(acc: AccelerometerFit, means: Array, gravity: float) -> bool:
