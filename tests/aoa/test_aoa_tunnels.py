@@ -96,10 +96,10 @@ def test_vibration_as_small_as_is_usual_makes_no_offset_to_speak_of():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sine", "polar", "rest"])
 def test_in_a_buffet_the_snap_is_that_of_the_data(kind):
-    """5 to 40 Hz, 0.05 to 0.3 deg rms: with the usual snap 3.5 u to 3900 u off; of 15 draws of all constants, 1.4 u."""
+    """5 to 40 Hz, 0.05 to 0.3 deg rms: with the usual snap 3.5 u to 3900 u off; of ten draws, 1.4 u."""
     ratios = []
     for name in BUFFETS:
-        for seed in range(3):
+        for seed in range(2):
             recording, run = recorded(name, seed, duration=20.0, kind=kind)
             chosen = decided(recording, study())
             filtered = estimate(recording, problem(chosen))
@@ -239,7 +239,7 @@ def test_in_vibration_the_angle_is_good_and_u_is_its_size(kind, smoothed):
     """Without a band 0.3 to 70 deg off, 24 to 210 u."""
     ratios = []
     for name in VIBRATIONS:
-        for seed in range(3):
+        for seed in range(2):
             recording, run = recorded(name, seed, duration=20.0, kind=kind)
             filtered = estimate(recording, problem(decided(recording, study())), smoothed)
             late = (run.t > 2.0) & (run.t < 19.8)

@@ -1,6 +1,6 @@
 """Laws of every run, however absurd its study and its recording: benchmarks/stress.py.
 
-The test run makes 125 runs of each system, `make campaign` the rest of 500.
+The test run makes 62 runs of each system, `make campaign` the rest of 500.
 
 A result is finite, with a covariance that is one and a known status, or the run is refused in one sentence; nothing
 warns, and nothing takes longer than 30 s. The seed was fixed before the first run.
@@ -15,7 +15,7 @@ from inercal.estimate.basis import Basis
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 
-RUNS, PARTS = 500, 4
+RUNS, PARTS = 500, 8
 
 
 @pytest.mark.slow

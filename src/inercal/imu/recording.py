@@ -14,7 +14,7 @@ from inercal.imu.limits import LIMITS
 from inercal.imu.rest import rest_of
 from inercal.instruments.triad import TriadModel
 from inercal.noise.dwell_means import AllanFit, fit_pooled
-from inercal.records.checks.values import saturated
+from inercal.records.checks.values import at_ends
 from inercal.records.column import Triad
 from inercal.records.dwells import Dwell, breaks, window_samples, windowed_variance
 from inercal.records.record import Record
@@ -163,10 +163,7 @@ def coarse_steps(values: Array, deviation: Array) -> Array:
 
 def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
     """Rows (n,) in which an axis saturates."""
-    clipped = np.zeros(len(gyro.t), dtype=bool)
-    for values in gyro.values.T:
-        clipped[saturated(values)] = True
-    return clipped
+    return np.any([at_ends(values) for values in gyro.values.T], axis=0)
 
 
 def unit_words(triad: Triad, model: TriadModel) -> str:

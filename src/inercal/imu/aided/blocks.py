@@ -14,7 +14,7 @@ from inercal.errors import RecordError
 from inercal.geometry.rotations import skew
 from inercal.imu.aided.table import Motion, forward
 from inercal.imu.limits import LIMITS
-from inercal.records.checks.values import saturated
+from inercal.records.checks.values import at_ends
 from inercal.records.column import Triad
 
 EDGE = 0.05
@@ -79,8 +79,7 @@ def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
     good = np.asarray(np.isfinite(triad.values).all(axis=1))
     at_end = {}
     for axis, values in zip("xyz", triad.values.T, strict=True):
-        # slow motion and noise reach the same levels without a sharp end
-        at_end[axis] = np.isin(values, np.unique(values[saturated(values)]))
+        at_end[axis] = at_ends(values)
     whole = np.r_[True, (np.diff(t) > 0.5 * interval) & (np.diff(t) < 1.5 * interval)]
 
     def rows(x: NDArray[Any]) -> NDArray[Any]:

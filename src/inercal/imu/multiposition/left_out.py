@@ -51,12 +51,12 @@ def shown(joint: Joint, of: Effects, noise: float = 0.0, noise_dof: float = 0.0)
     if fit.dof <= q:
         return None
     K = of.unexplained.T @ of.unexplained
-    estimate: Array = -np.linalg.solve(K, of.unexplained.T @ fit.residuals)
+    estimate = np.asarray(-np.linalg.solve(K, of.unexplained.T @ fit.residuals))
     gained = float(estimate @ K @ estimate)
     left, dof = (fit.chi2 - gained) / (fit.dof - q), float(fit.dof - q)
     if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
         left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
     if left <= 0:
         return None
-    u: Array = np.sqrt(np.diag(np.linalg.inv(K)) * left)
+    u = np.asarray(np.sqrt(np.diag(np.linalg.inv(K)) * left))
     return Shown(estimate, u, gained, float(fdtrc(q, dof, gained / q / left)))

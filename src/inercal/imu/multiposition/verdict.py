@@ -21,7 +21,7 @@ from inercal.imu.multiposition.joint import Scatter
 from inercal.imu.multiposition.poses import Poses
 from inercal.imu.recording import Recording, unit_words
 from inercal.imu.turns import Turns, first_guess
-from inercal.records.checks.values import saturated
+from inercal.records.checks.values import at_ends
 from inercal.records.places import counted
 
 
@@ -139,8 +139,7 @@ def clipped_poses(poses: Poses, scatter: Scatter, recording: Recording) -> Itera
         return
     triad, short = recording.accelerometer, list[int]()
     for values in triad.values.T:
-        at_end = np.zeros(len(values), dtype=bool)
-        at_end[saturated(values)] = True
+        at_end = at_ends(values)
         parts = [dwell.of(at_end).mean() for dwell in poses.dwells]
         short += [
             number for number, part in zip(poses.numbers, parts, strict=True) if part > LIMITS.clipped_part

@@ -186,6 +186,12 @@ def saturated(values: Array) -> NDArray[np.int64]:
     return rows_of(values, runs)
 
 
+def at_ends(values: Array) -> NDArray[np.bool_]:
+    """Samples (n,) of a signal at an extreme that it is `saturated` at elsewhere: single ones too, for what was beyond
+    is lost."""
+    return np.isin(values, np.unique(values[saturated(values)]))
+
+
 def outliers(values: Array, name: str) -> list[Finding]:
     """``outlier``: single samples far from their neighbours.
 
