@@ -30,7 +30,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one recording: ``status``; ``shift`` of the value that moved most, in u as stated, and its name in ``of``;
+    """Of one recording: ``status``; ``shift`` of the value that moved most, over U/2 as stated, and its name in ``of``;
     ``named`` the codes of what does harm; ``messages`` of all else that is said."""
 
     status: str
@@ -67,7 +67,8 @@ def compared(estimate, sound, errors: dict[str, float] | None = None, before: di
     """
     after = errors or {name: estimate[name].value for name in estimate.names}
     before = before or {name: sound[name].value for name in sound.names}
-    shifts = {name: abs(after[name] - before[name]) / estimate[name].u for name in after if name in before}
+    half = {name: 0.5 * estimate[name].U for name in after}  # u, but for few degrees of freedom
+    shifts = {name: abs(after[name] - before[name]) / half[name] for name in after if name in before}
     of = max(shifts, key=shifts.__getitem__, default="")
     return Outcome(estimate.status.value, float(shifts.get(of, 0.0)), of, *said(estimate.findings))
 

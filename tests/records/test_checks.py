@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from inercal.inputs import Source
 from inercal.records.checks import check
-from inercal.records.checks.values import outliers, saturation, time_axis, time_unit
+from inercal.records.checks.values import at_ends, outliers, saturation, time_axis, time_unit
 from inercal.records.column import Column
 from inercal.records.places import places
 from inercal.units import parse_unit
@@ -269,3 +269,16 @@ class TestUnits:
         assert finding.code == "unit_suspect"
         assert check(columns("deg/s", gyro_x=fast)) == ()
         assert check(columns("rad/s", gyro_x=fast / 60)) == ()
+
+
+def test_single_samples_at_a_level_where_a_signal_is_clipped_elsewhere_are_clipped_too():
+    """A slow swing rests at the end of the range for long, a fast one for a sample."""
+    rng = np.random.default_rng(20261126)
+    t = np.arange(4000) / 100.0
+    free = 2.5 * np.sin(2.0 * np.pi * 0.3 * t) * (t < 20.0) + 2.02 * np.sin(2.0 * np.pi * 5.0 * t) * (t >= 20.0)
+    free += 0.01 * rng.standard_normal(len(t))
+    clipped = np.clip(free, -2.0, 2.0)
+    beyond = np.abs(free) >= 2.0
+    assert beyond[t >= 20.0].any()
+    assert np.array_equal(at_ends(clipped), beyond)
+    assert not at_ends(free).any()

@@ -163,7 +163,7 @@ def coarse_steps(values: Array, deviation: Array) -> Array:
 
 def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
     """Rows (n,) in which an axis saturates."""
-    return np.any([at_ends(values) for values in gyro.values.T], axis=0)
+    return np.asarray(np.any([at_ends(values) for values in gyro.values.T], axis=0))
 
 
 def unit_words(triad: Triad, model: TriadModel) -> str:

@@ -139,7 +139,7 @@ def clipped_poses(poses: Poses, scatter: Scatter, recording: Recording) -> Itera
         return
     triad, short = recording.accelerometer, list[int]()
     for values in triad.values.T:
-        at_end = at_ends(values)
+        at_end = at_ends(values).astype(np.float64)
         parts = [dwell.of(at_end).mean() for dwell in poses.dwells]
         short += [
             number for number, part in zip(poses.numbers, parts, strict=True) if part > LIMITS.clipped_part
