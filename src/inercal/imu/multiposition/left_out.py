@@ -20,7 +20,7 @@ class Effects(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What the poses say of q errors: their likeliest sizes ``estimate`` (q,) with ``u`` (q,), the sum of squares
+    """The answer of the poses about q errors: their likeliest sizes ``estimate`` (q,) with ``u`` (q,), the sum of squares
     ``gained`` by them [(m/s^2)^2], and the ``probability`` of so much by chance."""
 
     estimate: Array
@@ -40,7 +40,7 @@ def effects(joint: Joint, in_force: Array) -> Effects:
 
 
 def shown(joint: Joint, of: Effects, noise: float = 0.0, noise_dof: float = 0.0) -> Shown | None:
-    """What the residuals say of errors, by an F test; None where too few poses are left, or no scatter.
+    """The answer of the residuals about errors, by an F test; None where too few poses are left, or no scatter.
 
     ``noise`` is the variance [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of
     freedom, 0 where it is not known; it is pooled with what the errors leave unless that is clearly more.

@@ -87,7 +87,7 @@ def squares_finding(
 
 
 def squares_shown(joint: Joint, noise: float, noise_dof: float) -> Shown | None:
-    """What the poses say of K2 that is not fitted; None where it is, or where they say nothing."""
+    """The answer of the poses about K2 that is not fitted; None where it is, or where they say nothing."""
     return None if joint.accelerometer.squares else shown(joint, _effects(joint), noise, noise_dof)
 
 
