@@ -20,7 +20,7 @@ class Effects(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """The answer of the poses about q errors: their likeliest sizes ``estimate`` (q,) with ``u`` (q,), the sum of squares
+    """The answer of the poses about q errors: likeliest sizes ``estimate`` (q,) with ``u`` (q,), the sum of squares
     ``gained`` by them [(m/s^2)^2], and the ``probability`` of so much by chance."""
 
     estimate: Array
