@@ -108,7 +108,9 @@ def row(name, draws, settings):
         verdicts[off.status.value] += 1
         named.update({f.code for f in off.findings if f.harm or f.code != "unmodelled_k2"} & set(CODES))
         common = [each for each in off.names if each in without.names]
-        shifts.append(max(abs(off[each].value - without[each].value) / off[each].u for each in common))
+        shifts.append(
+            max(abs(off[each].value - without[each].value) / (0.5 * off[each].U) for each in common)
+        )
         if off.status is Status.OK:
             passed.append(shifts[-1])
     size = f"{np.sqrt(np.mean(np.square(shifts))):.1f}" if shifts else "-"

@@ -275,7 +275,9 @@ def test_single_samples_at_a_level_where_a_signal_is_clipped_elsewhere_are_clipp
     """A slow swing rests at the end of the range for long, a fast one for a sample."""
     rng = np.random.default_rng(20261126)
     t = np.arange(4000) / 100.0
-    free = 2.5 * np.sin(2.0 * np.pi * 0.3 * t) * (t < 20.0) + 2.02 * np.sin(2.0 * np.pi * 5.0 * t) * (t >= 20.0)
+    free = 2.5 * np.sin(2.0 * np.pi * 0.3 * t) * (t < 20.0) + 2.02 * np.sin(2.0 * np.pi * 5.0 * t) * (
+        t >= 20.0
+    )
     free += 0.01 * rng.standard_normal(len(t))
     clipped = np.clip(free, -2.0, 2.0)
     beyond = np.abs(free) >= 2.0

@@ -91,6 +91,10 @@ class Limits:
     k2_probability: float = 5e-4
     """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
+    alone_probability: float = 0.01
+    """Probability below which the poses must show what the model lacks by their own scatter, that of the noise left
+    aside."""
+
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 

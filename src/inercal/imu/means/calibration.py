@@ -26,7 +26,7 @@ from inercal.imu.multiposition.deletion import outlying
 from inercal.imu.multiposition.joint import Joint, Scatter, join, type_a, type_b
 from inercal.imu.multiposition.outcome import FRAME, REFERENCES
 from inercal.imu.multiposition.outliers import linear_poses
-from inercal.imu.multiposition.squares import squares_finding, squares_source
+from inercal.imu.multiposition.squares import squares_finding, squares_shown, squares_source
 from inercal.imu.multiposition.verdict import curing_pose
 from inercal.imu.recording import unit_words
 from inercal.imu.rows import rows_of
@@ -192,7 +192,8 @@ def _findings(
     off = outlying(linear_poses(fitted.fit), LIMITS.outlier_risk)
     if not off:
         size = k2_size(settings, fitted.scatter.s)
-        of_k2 = squares_finding(fitted.joint, outputs, fitted.uncertainty, settings, size)
+        shown = squares_shown(fitted.joint, outputs, settings.site.gravity)
+        of_k2 = squares_finding(fitted.joint, outputs, fitted.uncertainty, settings, size, shown)
         return [*findings, *of_k2]
     without = _fit(np.delete(outputs, off, axis=0), settings)
     with np.errstate(divide="ignore", invalid="ignore"):

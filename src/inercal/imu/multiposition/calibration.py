@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from inercal.arrays import Array, short_repr
+from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding
 from inercal.imu.limits import LIMITS
-from inercal.imu.multiposition.drift import drift_finding
+from inercal.imu.multiposition.drift import drift_finding, drift_shown
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
 from inercal.imu.multiposition.gyro import GyroFit, fit_gyro
 from inercal.imu.multiposition.joint import Joint, Scatter, force_error, join
+from inercal.imu.multiposition.left_out import explained
 from inercal.imu.multiposition.outcome import assemble, uncertainty_of, without_fit
 from inercal.imu.multiposition.outliers import Outliers, outlier_finding, outliers_of
 from inercal.imu.multiposition.poses import Poses, choose, excluded, refitted, sweep
-from inercal.imu.multiposition.squares import squares_finding
+from inercal.imu.multiposition.squares import squares_finding, squares_shown
 from inercal.imu.multiposition.verdict import (
     axis_findings,
     clipped_poses,
@@ -106,11 +108,7 @@ def calibrate_multiposition(
     if outliers:
         findings.append(_outlier_finding(recording, fitted, outliers, settings))
     else:
-        size = k2_size(settings, fitted.scatter.s)
-        noise = float(np.mean(poses.noise_variance)), poses.noise_dof
-        drift = drift_finding(fitted.joint, recording, poses.times, uncertainty, *noise)
-        of_k2 = squares_finding(fitted.joint, poses.means, uncertainty, settings, size, *noise)
-        findings += of_k2 if drift is None else [drift]
+        findings += _left_out(fitted, recording, uncertainty, settings)
     estimate = assemble(record, recording, poses, fitted.scatter, fitted.joint, settings, findings)
     return MultipositionCalibration(timed(estimate, clock), recording, poses, fitted.gyro, outliers)
 
@@ -138,6 +136,25 @@ def _outlier_finding(
     uncertainty = uncertainty_of(without.joint, without.scatter, recording, settings)
     u = np.sqrt(np.diag(uncertainty.covariance))
     return outlier_finding(outliers, poses, recording.accelerometer.t, gyro, fitted.joint, without.joint, u)
+
+
+def _left_out(
+    fitted: _Fitted, recording: Recording, uncertainty: Uncertainty, settings: ImuSettings
+) -> Iterator[Finding]:
+    """Findings about K2 and drifting biases; where one explains the other, and not the reverse, about that one."""
+    joint, poses = fitted.joint, fitted.poses
+    noise = float(np.mean(poses.noise_variance)), poses.noise_dof
+    squares = squares_shown(joint, poses.means, settings.site.gravity, *noise)
+    drift = drift_shown(joint, poses.times, *noise)
+    if squares is not None and drift is not None:
+        if explained(joint, drift, squares, *noise):
+            drift = None
+        elif explained(joint, squares, drift, *noise):
+            squares = None
+    if drift is not None:
+        yield drift_finding(joint, drift, recording.accelerometer.unit.symbol, uncertainty)
+    size = k2_size(settings, fitted.scatter.s)
+    yield from squares_finding(joint, poses.means, uncertainty, settings, size, squares)
 
 
 def _scatter(poses: Poses) -> Scatter:

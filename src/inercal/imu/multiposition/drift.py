@@ -11,23 +11,12 @@ from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import inverses
 from inercal.imu.multiposition.joint import Joint
-from inercal.imu.multiposition.left_out import effects, shown
-from inercal.imu.multiposition.squares import squares_shown
-from inercal.imu.recording import Recording
+from inercal.imu.multiposition.left_out import Tested, effects, shown
 
 
-def drift_finding(
-    joint: Joint,
-    recording: Recording,
-    times: Array,
-    uncertainty: Uncertainty,
-    noise: float,
-    noise_dof: float,
-) -> Finding | None:
-    """A finding where the poses, at ``times`` (n,) [s], show that the biases change evenly with time, more than they
-    show K2.
+def drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
+    """Biases that change evenly with time, by the range of ``times`` (n,) [s] of the poses, where the poses show them.
 
-    It does harm where a value is shifted by more than its u, in which the scatter that the drift makes is already.
     ``noise`` and ``noise_dof`` are those of `inercal.imu.multiposition.left_out.shown`.
     """
     acc = joint.accelerometer
@@ -37,22 +26,23 @@ def drift_finding(
     through = (times - np.mean(times)) / lasts
     in_force = -inverses(acc.model, acc.k2, acc.f) * through[:, None, None]
     of = effects(joint, in_force.reshape(-1, 3))
-    if np.linalg.cond(of.unexplained) > LIMITS.condition:
-        return None
-    found, other = shown(joint, of, noise, noise_dof), squares_shown(joint, noise, noise_dof)
+    found = shown(joint, of, noise, noise_dof)
     if found is None or found.probability > LIMITS.driver_probability:
         return None
-    if other is not None and other.gained > found.gained:
-        return None
-    unit = recording.accelerometer.unit.symbol
-    words = ", ".join(
-        f"{axis} {' ± '.join(rounded(value, each))}"
-        for axis, value, each in zip("xyz", found.estimate, found.u, strict=True)
-    )
-    harmed = np.abs(of.shifts @ found.estimate) > uncertainty.u
+    return Tested(of, found, LIMITS.driver_probability)
+
+
+def drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertainty) -> Finding:
+    """The finding about biases that drift; outputs are in ``unit``.
+
+    It does harm where a value is shifted by more than its u, in which the scatter that the drift makes is already.
+    """
+    each = zip("xyz", found.shown.estimate, found.shown.u, strict=True)
+    words = ", ".join(f"{axis} {' ± '.join(rounded(value, u))}" for axis, value, u in each)
+    harmed = np.abs(found.effects.shifts @ found.shown.estimate) > uncertainty.u
     return Finding(
         "bias_drift",
-        f"the biases of the accelerometers drift over the recording by {words} {unit}; K0 is their "
-        "mean: let the unit warm up before the first pose, or take less time",
-        harm=tuple(name for name, each in zip(joint.names, harmed, strict=True) if each),
+        f"the biases of the accelerometers drift over the recording by {words} {unit}: let the unit warm up before the "
+        "first pose, or take less time",
+        harm=tuple(name for name, more in zip(joint.names, harmed, strict=True) if more),
     )

@@ -20,13 +20,20 @@ class Effects(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """The answer of the poses about q errors: likeliest sizes ``estimate`` (q,) with ``u`` (q,), the sum of squares
-    ``gained`` by them [(m/s^2)^2], and the ``probability`` of so much by chance."""
+    """The answer of the poses about q errors: likeliest sizes ``estimate`` (q,) with ``u`` (q,), and ``probability`` of
+    so much by chance."""
 
     estimate: Array
     u: Array
-    gained: float
     probability: float
+
+
+class Tested(NamedTuple):
+    """Errors with their ``effects``, ``shown`` by the poses with a probability below ``limit``."""
+
+    effects: Effects
+    shown: Shown
+    limit: float
 
 
 def effects(joint: Joint, in_force: Array) -> Effects:
@@ -39,24 +46,45 @@ def effects(joint: Joint, in_force: Array) -> Effects:
     )
 
 
-def shown(joint: Joint, of: Effects, noise: float = 0.0, noise_dof: float = 0.0) -> Shown | None:
-    """The answer of the residuals about errors, by an F test; None where too few poses are left, or no scatter.
+def shown(
+    joint: Joint, of: Effects, noise: float = 0.0, noise_dof: float = 0.0, beside: Effects | None = None
+) -> Shown | None:
+    """The answer of the residuals about errors, by an F test; None where too few poses are left, or no scatter, or
+    where the poses cannot tell the errors apart.
 
     ``noise`` is the variance [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of
-    freedom, 0 where it is not known; it is pooled with what the errors leave unless that is clearly more.
+    freedom, 0 where it is not known; it is pooled with what the errors leave unless that is clearly more. The poses
+    alone must show the errors too: a few of them cannot tell whether they scatter by more than the noise. ``beside``
+    are other errors, which are fitted with the coefficients.
     """
     from scipy.special import fdtrc
 
-    fit, q = joint.accelerometer.fit, of.unexplained.shape[1]
-    if fit.dof <= q:
+    r, X, dof = joint.accelerometer.fit.residuals, of.unexplained, float(joint.accelerometer.fit.dof)
+    if beside is not None:
+        Z = np.linalg.qr(beside.unexplained)[0]
+        r, X, dof = r - Z @ (Z.T @ r), X - Z @ (Z.T @ X), dof - Z.shape[1]
+    q = X.shape[1]
+    size = np.linalg.norm(of.unexplained, axis=0)
+    if dof <= q or not np.all(size > 0.0) or np.linalg.matrix_rank(X / size, tol=1e-6) < q:
         return None
-    K = of.unexplained.T @ of.unexplained
-    estimate = np.asarray(-np.linalg.solve(K, of.unexplained.T @ fit.residuals))
-    gained = float(estimate @ K @ estimate)
-    left, dof = (fit.chi2 - gained) / (fit.dof - q), float(fit.dof - q)
-    if noise > 0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
+    K = X.T @ X
+    estimate = np.asarray(-np.linalg.solve(K, X.T @ r))
+    gained, dof = float(estimate @ K @ estimate), dof - q
+    left = (float(r @ r) - gained) / dof
+    if left <= 0.0:
+        return None
+    alone = float(fdtrc(q, dof, gained / q / left))
+    if noise > 0.0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
         left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
-    if left <= 0:
-        return None
+    pooled = float(fdtrc(q, dof, gained / q / left))
     u = np.asarray(np.sqrt(np.diag(np.linalg.inv(K)) * left))
-    return Shown(estimate, u, gained, float(fdtrc(q, dof, gained / q / left)))
+    return Shown(estimate, u, pooled if alone < LIMITS.alone_probability else max(alone, pooled))
+
+
+def explained(joint: Joint, one: Tested, other: Tested, noise: float, noise_dof: float) -> bool:
+    """True where the ``other`` errors leave nothing for the ``one``, and not the reverse."""
+    gone = shown(joint, one.effects, noise, noise_dof, other.effects)
+    stays = shown(joint, other.effects, noise, noise_dof, one.effects)
+    return (gone is None or gone.probability > one.limit) and (
+        stays is not None and stays.probability <= other.limit
+    )

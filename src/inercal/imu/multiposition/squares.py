@@ -17,7 +17,7 @@ from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.imu.multiposition.joint import Joint, Scatter
-from inercal.imu.multiposition.left_out import Effects, Shown, effects, shown
+from inercal.imu.multiposition.left_out import Effects, Tested, effects, shown
 from inercal.imu.second_order import SOURCE, k2_finding, shares
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import shown_unit
@@ -42,53 +42,59 @@ def squares_source(joint: Joint, scatter: Scatter, size: float) -> list[TypeB]:
     return [TypeB(SOURCE, size, "1/(m/s^2)", shifts @ columns / size)]
 
 
+def squares_shown(
+    joint: Joint, means: Array, gravity: float, noise: float = 0.0, noise_dof: float = 0.0
+) -> Tested | None:
+    """K2 that is not fitted, where the poses, of mean outputs ``means`` (n, 3), allow to fit it and show it.
+
+    ``noise`` and ``noise_dof`` are those of `inercal.imu.multiposition.left_out.shown`.
+    """
+    acc = joint.accelerometer
+    if acc.squares or not _allowed(acc, means, gravity):
+        return None
+    of = _effects(joint)
+    found = shown(joint, of, noise, noise_dof)
+    if found is None or found.probability > LIMITS.k2_probability:
+        return None
+    return Tested(of, found, LIMITS.k2_probability)
+
+
 def squares_finding(
     joint: Joint,
     means: Array,
     uncertainty: Uncertainty,
     settings: ImuSettings,
     size: float,
-    noise: float = 0.0,
-    noise_dof: float = 0.0,
+    found: Tested | None,
 ) -> Iterator[Finding]:
-    """A finding where K2 shows, or where u of a value is mostly an ordinary one; none where it is fitted.
+    """A finding where K2 was ``found`` by `squares_shown`, or where u of a value is mostly an ordinary one; none where
+    it is fitted.
 
     What shows does harm where it shifts a value by more than the rest of its u; where ``size`` [1/(m/s^2)], as of
-    `squares_source`, was stated, by more than the whole. ``means`` (n, 3) are the outputs; ``noise`` is the variance
-    [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of freedom, 0 where it is not known.
+    `squares_source`, was stated, by more than the whole. ``means`` (n, 3) are the outputs.
     """
     acc = joint.accelerometer
     if acc.squares:
         return
-    of = _effects(joint)
-    allowed = _allowed(acc, means, settings.site.gravity)
     names, unit = joint.names, shown_unit("1/(m/s^2)")
-    u = uncertainty.u
-    if settings.k2_u is None:
-        u = u * np.sqrt(1.0 - shares(names, uncertainty))
-    found = shown(joint, of, noise, noise_dof) if allowed else None
-    if found is not None and found.probability < LIMITS.k2_probability:
-        words = ", ".join(
-            f"{axis} {' ± '.join(rounded(value, each))}"
-            for axis, value, each in zip("xyz", found.estimate / unit[1], found.u / unit[1], strict=True)
-        )
-        harmed = np.abs(of.shifts @ found.estimate) > u
+    if found is not None:
+        u = uncertainty.u
+        if settings.k2_u is None:
+            u = u * np.sqrt(1.0 - shares(names, uncertainty))
+        each = zip("xyz", found.shown.estimate / unit[1], found.shown.u / unit[1], strict=True)
+        words = ", ".join(f"{axis} {' ± '.join(rounded(value, more))}" for axis, value, more in each)
+        harmed = np.abs(found.effects.shifts @ found.shown.estimate) > u
         yield Finding(
             "unmodelled_k2",
             f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}) that are not "
             "fitted: set imu.k2 = true",
-            harm=tuple(name for name, each in zip(names, harmed, strict=True) if each),
+            harm=tuple(name for name, more in zip(names, harmed, strict=True) if more),
         )
         return
     cure = "set imu.k2 = true"
-    if not allowed:
+    if not _allowed(acc, means, settings.site.gravity):
         cure = f"add poses on the edges and corners between the sides, {LIMITS.poses_with_k2} poses or more, and {cure}"
     yield from k2_finding(names, uncertainty, settings, size, cure)
-
-
-def squares_shown(joint: Joint, noise: float, noise_dof: float) -> Shown | None:
-    """The answer of the poses about K2 that is not fitted; None where it is, or where they say nothing."""
-    return None if joint.accelerometer.squares else shown(joint, _effects(joint), noise, noise_dof)
 
 
 def _effects(joint: Joint) -> Effects:
