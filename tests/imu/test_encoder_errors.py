@@ -63,3 +63,12 @@ def test_an_encoder_off_its_centre_is_named_at_any_size(table, degrees):
 def test_an_encoder_whose_error_comes_twice_in_a_turn_is_named(table, degrees):
     for joint in JOINTS:
         judged(table, joint, degrees, 2)
+
+
+@pytest.mark.campaign
+@for_each("degrees", [0.02, 0.05, 0.2, 1.0, 5.0])
+def test_an_encoder_in_error_is_named_at_every_size(table, degrees):
+    for joint in JOINTS:
+        judged(table, joint, degrees, 1)
+        if degrees > 0.02:
+            judged(table, joint, degrees, 2)
