@@ -27,7 +27,7 @@ from scipy.stats import beta
 
 SYSTEMS = ("imu", "strapdown", "turntable", "selfcal", "aoa")
 HARMFUL = 2.0
-"""A shift [u] from which a fault does harm."""
+"""A shift [U/2, which is u but for few degrees of freedom] from which a fault does harm."""
 
 
 def module(system: str):

@@ -94,6 +94,19 @@ def test_of_poses_in_order_no_drift_hides_k2(size):
         assert len(of_k2) == 1 or size
 
 
+@pytest.mark.campaign
+def test_of_poses_in_order_what_is_ok_is_right():
+    """K2 of 200 and 500 ug/g^2, a drift of 5 mm/s^2 and none, eight units each: no value is beyond 2.6 of U/2."""
+    for k2, size, draw in itertools.product((200e-6, 500e-6), (0.0, 0.005), range(8)):
+        estimate = drifting(draw, size, k2 / 9.80665, in_order()).estimate
+        truth = imu.unit(np.random.default_rng([imu_faults.SEED, draw])).truth()
+        off = [
+            abs(each.value - truth[each.name]) / (0.5 * each.U)
+            for each in map(estimate.__getitem__, estimate.names)
+        ]
+        assert estimate.status is Status.SUSPECT or max(off) < 2.6, (k2, size, draw)
+
+
 def few(rng, excess, poses=14):
     """Poses of accelerometers alone, in which |f| scatters by ``excess`` times what noise explains."""
     made = imu.unit(rng)

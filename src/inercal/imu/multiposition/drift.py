@@ -6,12 +6,11 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import Uncertainty
-from inercal.estimate.rounding import rounded
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import inverses
 from inercal.imu.multiposition.joint import Joint
-from inercal.imu.multiposition.left_out import Tested, effects, shown
+from inercal.imu.multiposition.left_out import Tested, effects, harmed, in_words, shown
 
 
 def drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
@@ -37,12 +36,9 @@ def drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertain
 
     It does harm where a value is shifted by more than its u, in which the scatter that the drift makes is already.
     """
-    each = zip("xyz", found.shown.estimate, found.shown.u, strict=True)
-    words = ", ".join(f"{axis} {' ± '.join(rounded(value, u))}" for axis, value, u in each)
-    harmed = np.abs(found.effects.shifts @ found.shown.estimate) > uncertainty.u
     return Finding(
         "bias_drift",
-        f"the biases of the accelerometers drift over the recording by {words} {unit}: let the unit warm up before the "
-        "first pose, or take less time",
-        harm=tuple(name for name, more in zip(joint.names, harmed, strict=True) if more),
+        f"the biases of the accelerometers drift over the recording by {in_words(found.shown)} {unit}: let the unit "
+        "warm up before the first pose, or take less time",
+        harm=harmed(found, joint.names, uncertainty.u),
     )

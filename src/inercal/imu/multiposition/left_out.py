@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.rounding import rounded
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.joint import Joint, radial
 
@@ -34,6 +35,18 @@ class Tested(NamedTuple):
     effects: Effects
     shown: Shown
     limit: float
+
+
+def in_words(found: Shown, size: float = 1.0) -> str:
+    """The sizes of errors of the three axes with their u, in units of ``size``: ``x 20 ± 3, y ..``."""
+    each = zip("xyz", found.estimate / size, found.u / size, strict=True)
+    return ", ".join(f"{axis} {' ± '.join(rounded(value, u))}" for axis, value, u in each)
+
+
+def harmed(found: Tested, names: tuple[str, ...], u: Array) -> tuple[str, ...]:
+    """Those of the coefficients ``names`` (p,) that errors shift by more than ``u`` (p,)."""
+    beyond = np.abs(found.effects.shifts @ found.shown.estimate) > u
+    return tuple(name for name, more in zip(names, beyond, strict=True) if more)
 
 
 def effects(joint: Joint, in_force: Array) -> Effects:

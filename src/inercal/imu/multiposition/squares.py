@@ -12,12 +12,11 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeB, Uncertainty
-from inercal.estimate.rounding import rounded
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.imu.multiposition.joint import Joint, Scatter
-from inercal.imu.multiposition.left_out import Effects, Tested, effects, shown
+from inercal.imu.multiposition.left_out import Effects, Tested, effects, harmed, in_words, shown
 from inercal.imu.second_order import SOURCE, k2_finding, shares
 from inercal.imu.settings import ImuSettings
 from inercal.instruments.terms import shown_unit
@@ -81,14 +80,12 @@ def squares_finding(
         u = uncertainty.u
         if settings.k2_u is None:
             u = u * np.sqrt(1.0 - shares(names, uncertainty))
-        each = zip("xyz", found.shown.estimate / unit[1], found.shown.u / unit[1], strict=True)
-        words = ", ".join(f"{axis} {' ± '.join(rounded(value, more))}" for axis, value, more in each)
-        harmed = np.abs(found.effects.shifts @ found.shown.estimate) > u
+        words = in_words(found.shown, unit[1])
         yield Finding(
             "unmodelled_k2",
             f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}) that are not "
             "fitted: set imu.k2 = true",
-            harm=tuple(name for name, more in zip(names, harmed, strict=True) if more),
+            harm=harmed(found, names, u),
         )
         return
     cure = "set imu.k2 = true"
