@@ -59,6 +59,27 @@ def ramp(size, which):
     return change
 
 
+def warming(size, which, over=30.0):
+    """A bias that dies away over 30 s, as a unit warms up, less its mean, of accelerometers (0) or gyros (1)."""
+
+    def change(t, acc, gyro, rng):
+        left = np.exp(-t / over)
+        drift = size * (left - left.mean())[:, None] * np.array([1.0, -1.0, 1.0])
+        return (t, acc + drift, gyro) if which == 0 else (t, acc, gyro + drift)
+
+    return change
+
+
+def growing(size, which):
+    """Scale factors that change evenly from begin to end, of accelerometers (0) or gyros (1)."""
+
+    def change(t, acc, gyro, rng):
+        factor = 1.0 + size * (t / t[-1] - 0.5)[:, None] * np.array([1.0, -1.0, 1.0])
+        return (t, acc * factor, gyro) if which == 0 else (t, acc, gyro * factor)
+
+    return change
+
+
 def missing(share):
     """Rows left out at random, stamps kept."""
 
@@ -105,6 +126,15 @@ OF_FILES = {
     "gyros drift by 10 mrad/s": ramp(1e-2, 1),
     "accelerometers drift by 5 mm/s^2": ramp(5e-3, 0),
     "accelerometers drift by 50 mm/s^2": ramp(5e-2, 0),
+    "gyros warm up by 1 mrad/s": warming(1e-3, 1),
+    "gyros warm up by 10 mrad/s": warming(1e-2, 1),
+    "accelerometers warm up by 5 mm/s^2": warming(5e-3, 0),
+    "accelerometers warm up by 20 mm/s^2": warming(2e-2, 0),
+    "accelerometers warm up by 50 mm/s^2": warming(5e-2, 0),
+    "scales of accelerometers drift by 500 ppm": growing(5e-4, 0),
+    "scales of accelerometers drift by 2000 ppm": growing(2e-3, 0),
+    "scales of gyros drift by 2000 ppm": growing(2e-3, 1),
+    "scales of gyros drift by 5000 ppm": growing(5e-3, 1),
     "1 % of rows lost": missing(0.01),
     "10 % of rows lost": missing(0.1),
     "stamps jitter by 2 ms": jittered,

@@ -14,12 +14,18 @@ from inercal.estimate.budget import Uncertainty
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding
 from inercal.imu.limits import LIMITS
-from inercal.imu.multiposition.drift import drift_finding, drift_shown
+from inercal.imu.multiposition.drift import (
+    bias_drift_finding,
+    bias_drift_shown,
+    gyro_scale_drift,
+    scale_drift_finding,
+    scale_drift_shown,
+)
 from inercal.imu.multiposition.drivers import drivers_of
 from inercal.imu.multiposition.earth_rate import earth_rate_at
 from inercal.imu.multiposition.gyro import GyroFit, fit_gyro
 from inercal.imu.multiposition.joint import Joint, Scatter, force_error, join
-from inercal.imu.multiposition.left_out import explained
+from inercal.imu.multiposition.left_out import unexplained
 from inercal.imu.multiposition.outcome import assemble, uncertainty_of, without_fit
 from inercal.imu.multiposition.outliers import Outliers, outlier_finding, outliers_of
 from inercal.imu.multiposition.poses import Poses, choose, excluded, refitted, sweep
@@ -141,20 +147,23 @@ def _outlier_finding(
 def _left_out(
     fitted: _Fitted, recording: Recording, uncertainty: Uncertainty, settings: ImuSettings
 ) -> Iterator[Finding]:
-    """Findings about K2 and drifting biases; where one explains the other, and not the reverse, about that one."""
+    """Findings about K2 and drifts of biases and scale factors; of the accelerometers those that no other explains."""
     joint, poses = fitted.joint, fitted.poses
     noise = float(np.mean(poses.noise_variance)), poses.noise_dof
-    squares = squares_shown(joint, poses.means, settings.site.gravity, *noise)
-    drift = drift_shown(joint, poses.times, *noise)
-    if squares is not None and drift is not None:
-        if explained(joint, drift, squares, *noise):
-            drift = None
-        elif explained(joint, squares, drift, *noise):
-            squares = None
-    if drift is not None:
-        yield drift_finding(joint, drift, recording.accelerometer.unit.symbol, uncertainty)
+    found = {
+        "squares": squares_shown(joint, poses.means, settings.site.gravity, *noise),
+        "bias": bias_drift_shown(joint, poses.times, *noise),
+        "scale": scale_drift_shown(joint, poses.times, *noise),
+    }
+    stand = unexplained(joint, found, *noise)
+    if (bias := stand.get("bias")) is not None:
+        yield bias_drift_finding(joint, bias, recording.accelerometer.unit.symbol, uncertainty)
+    if (scale := stand.get("scale")) is not None:
+        yield scale_drift_finding(joint, scale, uncertainty)
+    if fitted.gyro is not None:
+        yield from gyro_scale_drift(fitted.gyro, poses.times, joint.names, uncertainty)
     size = k2_size(settings, fitted.scatter.s)
-    yield from squares_finding(joint, poses.means, uncertainty, settings, size, squares)
+    yield from squares_finding(joint, poses.means, uncertainty, settings, size, stand.get("squares"))
 
 
 def _scatter(poses: Poses) -> Scatter:

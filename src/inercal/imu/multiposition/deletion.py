@@ -13,12 +13,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.imu.limits import LIMITS
+
+
+class Added(NamedTuple):
+    """The answer of a fit about q parameters that it lacks: likeliest sizes ``estimate`` (q,) with ``u`` (q,), the
+    ``probability`` of so much by chance, and what they do to those it has, ``shifts`` (P, q)."""
+
+    estimate: Array
+    u: Array
+    probability: float
+    shifts: Array
 
 
 @dataclass(frozen=True)
@@ -97,6 +108,34 @@ class LinearFit:
         _, J, r = self._whitened(variance)
         pull = J.T @ r
         return float(r @ r - pull @ self._inverse(J) @ pull)
+
+    def added(self, columns: Array) -> Added | None:
+        """The answer of the rows, by an F test, about q more parameters of the Jacobian ``columns`` (n, d, q).
+
+        None where the rows do not tell them.
+        """
+        from scipy.special import fdtrc
+
+        X, r = columns.reshape(self.residuals.size, -1), self.residuals.ravel()
+        q, dof = X.shape[1], self.dof - X.shape[1]
+        variance = self.variance()
+        Q = self.weights(variance)
+        K = X.T @ Q @ X
+        size = np.sqrt(np.maximum(np.diag(K), 0.0))
+        if dof < 1 or not np.all(size > 0.0) or np.linalg.matrix_rank(K / np.outer(size, size), tol=1e-6) < q:
+            return None
+        pull = X.T @ Q @ r
+        unit = np.linalg.inv(K)
+        gained = float(pull @ unit @ pull)
+        left = max(float(r @ Q @ r) - gained, 1e-300) / dof
+        _, J, _ = self._whitened(variance)
+        white = replace(self, jacobian=columns)._whitened(variance)[1]
+        return Added(
+            np.asarray(-unit @ pull),
+            np.sqrt(np.diag(unit) * left),
+            float(fdtrc(q, dof, gained / q / left)),
+            np.asarray(self._inverse(J) @ J.T @ white),
+        )
 
     def variance(self) -> float:
         """Size of the growing part by which the sum of squares is its degrees of freedom; hardly anything at least."""

@@ -1,6 +1,12 @@
-"""Biases of the accelerometers that drift through a recording, as they do while a unit warms up."""
+"""Biases and scale factors that drift through a recording, as they do while a unit warms up.
+
+Those of the accelerometers show in the poses, scale factors of the gyro in the turns; its biases, which show at rest,
+are in `inercal.imu.multiposition.verdict`.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,21 +15,41 @@ from inercal.estimate.budget import Uncertainty
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
 from inercal.imu.multiposition.accelerometer import inverses
+from inercal.imu.multiposition.gyro import GyroFit
 from inercal.imu.multiposition.joint import Joint
 from inercal.imu.multiposition.left_out import Tested, effects, harmed, in_words, shown
 
+PPM = 1e-6
+SCALES = slice(3, 6)
+"""Places of the scale factors among the parameters of a gyro."""
 
-def drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
+_CURE = "let the unit warm up before the first pose, or take less time"
+
+
+def bias_drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
     """Biases that change evenly with time, by the range of ``times`` (n,) [s] of the poses, where the poses show them.
 
     ``noise`` and ``noise_dof`` are those of `inercal.imu.multiposition.left_out.shown`.
     """
+    return _drift_shown(joint, times, np.ones((len(times), 3)), noise, noise_dof)
+
+
+def scale_drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
+    """The same of scale factors, relative."""
+    acc = joint.accelerometer
+    return _drift_shown(joint, times, acc.model.scale * (acc.f @ acc.model.misalignment.T), noise, noise_dof)
+
+
+def _drift_shown(
+    joint: Joint, times: Array, in_output: Array, noise: float, noise_dof: float
+) -> Tested | None:
+    """Errors that grow evenly with time to changes ``in_output`` (n, 3) of each axis, where the poses show them."""
     acc = joint.accelerometer
     lasts = float(np.ptp(times))
     if lasts <= 0.0:
         return None
     through = (times - np.mean(times)) / lasts
-    in_force = -inverses(acc.model, acc.k2, acc.f) * through[:, None, None]
+    in_force = -inverses(acc.model, acc.k2, acc.f) * (through[:, None] * in_output)[:, None, :]
     of = effects(joint, in_force.reshape(-1, 3))
     found = shown(joint, of, noise, noise_dof)
     if found is None or found.probability > LIMITS.driver_probability:
@@ -31,14 +57,46 @@ def drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> T
     return Tested(of, found, LIMITS.driver_probability)
 
 
-def drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertainty) -> Finding:
+def bias_drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertainty) -> Finding:
     """The finding about biases that drift; outputs are in ``unit``.
 
     It does harm where a value is shifted by more than its u, in which the scatter that the drift makes is already.
     """
     return Finding(
         "bias_drift",
-        f"the biases of the accelerometers drift over the recording by {in_words(found.shown)} {unit}: let the unit "
-        "warm up before the first pose, or take less time",
+        f"the biases of the accelerometers drift over the recording by {in_words(found.shown)} {unit}: {_CURE}",
+        harm=harmed(found, joint.names, uncertainty.u),
+    )
+
+
+def gyro_scale_drift(
+    gyro: GyroFit, times: Array, names: tuple[str, ...], uncertainty: Uncertainty
+) -> Iterator[Finding]:
+    """A finding where the turns show that the gyro's scale factors change evenly with ``times`` (n,) [s] of the poses;
+    harm to the coefficients ``names`` as with biases."""
+    at = 0.5 * (times[gyro.first] + times[gyro.first + 1])
+    through = (at - np.mean(at)) / np.ptp(times)
+    columns = gyro.linear.jacobian[:, :, SCALES] * gyro.model.scale * through[:, None, None]
+    found = gyro.linear.added(columns)
+    if found is None or found.probability > LIMITS.driver_probability:
+        return
+    shifts = dict(
+        zip(gyro.names, found.shifts @ found.estimate, strict=False)
+    )  # then the unknown parts of earth rate
+    yield Finding(
+        "trend",
+        f"the scale factors of the gyro change over the recording by {in_words(found, PPM)} ppm: {_CURE}",
+        harm=tuple(
+            name for name, u in zip(names, uncertainty.u, strict=True) if abs(shifts.get(name, 0.0)) > u
+        ),
+    )
+
+
+def scale_drift_finding(joint: Joint, found: Tested, uncertainty: Uncertainty) -> Finding:
+    """The finding about scale factors that drift; harm as with biases."""
+    return Finding(
+        "trend",
+        f"the scale factors of the accelerometers change over the recording by {in_words(found.shown, PPM)} ppm: "
+        f"{_CURE}",
         harm=harmed(found, joint.names, uncertainty.u),
     )

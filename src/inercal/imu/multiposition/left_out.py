@@ -9,6 +9,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded
 from inercal.imu.limits import LIMITS
+from inercal.imu.multiposition.deletion import Added
 from inercal.imu.multiposition.joint import Joint, radial
 
 
@@ -37,7 +38,7 @@ class Tested(NamedTuple):
     limit: float
 
 
-def in_words(found: Shown, size: float = 1.0) -> str:
+def in_words(found: Shown | Added, size: float = 1.0) -> str:
     """The sizes of errors of the three axes with their u, in units of ``size``: ``x 20 ± 3, y ..``."""
     each = zip("xyz", found.estimate / size, found.u / size, strict=True)
     return ", ".join(f"{axis} {' ± '.join(rounded(value, u))}" for axis, value, u in each)
@@ -94,10 +95,20 @@ def shown(
     return Shown(estimate, u, pooled if alone < LIMITS.alone_probability else max(alone, pooled))
 
 
-def explained(joint: Joint, one: Tested, other: Tested, noise: float, noise_dof: float) -> bool:
-    """True where the ``other`` errors leave nothing for the ``one``, and not the reverse."""
-    gone = shown(joint, one.effects, noise, noise_dof, other.effects)
-    stays = shown(joint, other.effects, noise, noise_dof, one.effects)
-    return (gone is None or gone.probability > one.limit) and (
-        stays is not None and stays.probability <= other.limit
-    )
+def unexplained(
+    joint: Joint, found: dict[str, Tested | None], noise: float, noise_dof: float
+) -> dict[str, Tested]:
+    """Of the errors ``found``, by name, those for which none of the others leaves nothing while itself it stays."""
+    stand = {name: each for name, each in found.items() if each is not None}
+    if len(stand) < 2:
+        return stand
+
+    def gone(one: Tested, other: Tested) -> bool:
+        left = shown(joint, one.effects, noise, noise_dof, other.effects)
+        return left is None or left.probability > one.limit
+
+    return {
+        name: one
+        for name, one in stand.items()
+        if not any(gone(one, other) and not gone(other, one) for other in stand.values() if other is not one)
+    }
