@@ -136,6 +136,17 @@ def test_saturated_samples_are_masked_and_counted():
         assert not found.masked[:, [0, 2, 3]].any()
 
 
+def test_single_samples_at_the_end_of_a_range_are_lost_too():
+    """Noise takes samples beyond the range in ones and twos, beside the runs that show where it ends."""
+    limit = 0.5
+    noisy = TRUE.acc[:, 1] / G + 0.05 * np.random.default_rng(2).standard_normal(len(T))
+    beyond = noisy > limit
+    alone = beyond[1:-1] & ~beyond[:-2] & ~beyond[2:]
+    assert alone.sum() > 10
+    found = recording_of(record(a2=np.minimum(noisy, limit)), SHORT)
+    np.testing.assert_array_equal(found.masked[:, 1], beyond)
+
+
 def test_missing_sensors():
     found = recording_of(record(gyro=None), SHORT)
     assert codes(found) == ["gyro_missing"]

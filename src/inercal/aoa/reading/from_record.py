@@ -16,7 +16,7 @@ from inercal.aoa.settings import GYROS, AoaSettings, Calibration
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.findings import EVERYTHING, Finding
-from inercal.records.checks.values import is_dead, plateaus, saturated
+from inercal.records.checks.values import at_ends, is_dead, plateaus
 from inercal.records.column import Column, usable_interval
 from inercal.records.places import counted, counted_names, places
 from inercal.records.record import Record, recorded_temperature
@@ -165,8 +165,7 @@ class _Rows:
 def _lost(column: Column, settings: AoaSettings, values: dict[str, Array]) -> tuple[Flags, Flags]:
     """Samples (m,) that are saturated, and those that are stuck."""
     name, read = column.name, column.values
-    out = np.zeros(len(read), dtype=np.bool_)
-    out[saturated(read)] = True
+    out = at_ends(read)
     how = settings.calibration(name)
     if how.range is not None:
         out |= at_range(indication(column, read), values[name], how)
