@@ -8,6 +8,7 @@ import importlib
 import json
 import re
 import runpy
+import subprocess
 import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -242,6 +243,29 @@ def test_a_run_without_end_is_ended_in_any_thread(monkeypatch):
     assert found.outcome == "failed"
     assert found.wrong[0].startswith("TooLongError: no end within 0.1 s")
     assert runs.one("drift", 3).outcome == expected.outcome
+
+
+def test_a_run_within_its_time_leaves_nothing_behind():
+    """In a process whose lines are traced, as for coverage: it would go on with the same step for ever."""
+    code = (
+        "import sys\n"
+        "from absurd.runs import limited\n"
+        "sys.settrace(lambda *event: None)\n"
+        "with limited(9.0):\n"
+        "    pass\n"
+        "def one():\n"
+        "    return 1\n"
+        "print(sum(one() for _ in range(9)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT / "benchmarks",
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=30.0,
+    )
+    assert done.stdout == "9\n"
 
 
 def test_the_catalogue_of_faults_counts_what_ends_ok(tmp_path):
