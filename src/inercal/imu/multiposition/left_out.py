@@ -61,7 +61,12 @@ def effects(joint: Joint, in_force: Array) -> Effects:
 
 
 def shown(
-    joint: Joint, of: Effects, noise: float = 0.0, noise_dof: float = 0.0, beside: Effects | None = None
+    joint: Joint,
+    of: Effects,
+    noise: float = 0.0,
+    noise_dof: float = 0.0,
+    beside: Effects | None = None,
+    tries: int = 1,
 ) -> Shown | None:
     """The answer of the residuals about errors, by an F test; None where too few poses are left, or no scatter, or
     where the poses cannot tell the errors apart.
@@ -69,7 +74,8 @@ def shown(
     ``noise`` is the variance [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of
     freedom, 0 where it is not known; it is pooled with what the errors leave unless that is clearly more. The poses
     alone must show the errors too: a few of them cannot tell whether they scatter by more than the noise. ``beside``
-    are other errors, which are fitted with the coefficients.
+    are other errors, which are fitted with the coefficients. The probability is that of the least likely of so many
+    ``tries``, with other effects.
     """
     from scipy.special import fdtrc
 
@@ -87,12 +93,12 @@ def shown(
     left = (float(r @ r) - gained) / dof
     if left <= 0.0:
         return None
-    alone = float(fdtrc(q, dof, gained / q / left))
+    alone = tries * float(fdtrc(q, dof, gained / q / left))
     if noise > 0.0 and fdtrc(dof, noise_dof, left / noise) > LIMITS.scatter_probability:
         left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
-    pooled = float(fdtrc(q, dof, gained / q / left))
+    pooled = tries * float(fdtrc(q, dof, gained / q / left))
     u = np.asarray(np.sqrt(np.diag(np.linalg.inv(K)) * left))
-    return Shown(estimate, u, pooled if alone < LIMITS.alone_probability else max(alone, pooled))
+    return Shown(estimate, u, min(1.0, pooled if alone < LIMITS.alone_probability else max(alone, pooled)))
 
 
 def unexplained(
