@@ -53,13 +53,17 @@ bench: .venv/dev/installed
 	$(DEV)/python benchmarks/run.py --out build/bench
 
 # Hashes and an editable install do not mix in one call, hence two; the second needs no network. The pins are complete,
-# so nothing is resolved; what is imported is byte-compiled then, the rest never. Half the time.
+# so nothing is resolved; what is imported is byte-compiled then, the rest never. pip unpacks on one processor: two of
+# them, each with every second package.
 .venv/run/installed: requirements/run.txt pyproject.toml
 .venv/dev/installed: requirements/dev.txt pyproject.toml
 .venv/workbench/installed: requirements/workbench.txt pyproject.toml
 .venv/%/installed:
 	$(PYTHON) -m venv --clear .venv/$*
-	.venv/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-compile --require-hashes -r requirements/$*.txt
+	awk '/^[a-zA-Z]/ {half = 1 - half} {print > (".venv/$*/half-" half)}' requirements/$*.txt
+	@half() { .venv/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-compile \
+	    --require-hashes -r .venv/$*/half-$$1; }; \
+	    half 0 & one=$$!; half 1; other=$$?; wait $$one && exit $$other
 	.venv/$*/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 

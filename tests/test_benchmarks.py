@@ -29,7 +29,7 @@ PAGE = ROOT / "docs" / "design" / "benchmarks.md"
 
 PARTS = {**bench.PARTS, "Fleets": "fleets"}
 """Each part of a run, and one that is run alone."""
-LONG = ("Commands", "Fleets")
+LONG = ("Commands", "Fleets", "IMU by hand", "Strapdown")
 
 
 @functools.cache

@@ -128,7 +128,7 @@ def test_nothing_is_found_anew_where_nothing_was_lost(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("moving", [True, pytest.param(False, marks=pytest.mark.campaign)])
 def test_a_million_samples_without_a_missing_angle(moving):
     """19 states, at rest or moving with spikes and lost rows: angles, uncertainties, a covariance that is one.
 

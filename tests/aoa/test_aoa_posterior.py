@@ -117,12 +117,12 @@ def test_a_smaller_filter_takes_what_it_has_states_for(saved, states):
 def test_a_sweep_lowers_u_of_the_next_run_which_stays_consistent():
     """A sweep shows the biases, which make most of u at one angle. Sensors drawn from the study's prior, each with a
     run of its own: the mean of error^2/u^2, all but constant over a run at rest, is 1 at most within 5 standard
-    deviations of chi-square of 16; it may be less, for nothing shakes the sting here."""
+    deviations of chi-square of 8; it may be less, for nothing shakes the sting here."""
     ratios, lower = [], []
     rng = np.random.default_rng(7)
     first, second = study(motion=SWEEP), study(motion=STILL)
     before, of = problem(first), problem(second)
-    for _ in range(16):
+    for _ in range(8):
         errors = all_errors(rng)
         state = estimate(simulate(first, rng, errors).recording, before).state
         at = before.nuisances
@@ -135,7 +135,7 @@ def test_a_sweep_lowers_u_of_the_next_run_which_stays_consistent():
         ratios.append(np.mean(np.square((found.theta - made.theta) / found.u)))
         lower.append(np.median(found.u) / np.median(estimate(made.recording, of, smoothed=True).u))
     assert max(lower) < 0.6
-    assert 0.1 < np.mean(ratios) < 1.0 + 5.0 * np.sqrt(2.0 / 16.0)
+    assert 0.1 < np.mean(ratios) < 1.0 + 5.0 * np.sqrt(2.0 / 8.0)
 
 
 def test_the_budget_of_a_run_with_a_prior_names_the_earlier_run(saved):

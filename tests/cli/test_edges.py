@@ -232,9 +232,14 @@ def test_standard_output_may_be_closed(folder):
     "command",
     [
         "apply cal.json log.csv --out x.csv",
-        "inspect log.csv --report r.html",
-        "convert cal.json --to kalibr --out k.yaml",
-        "allan log.csv --out n.json",
+        *(
+            pytest.param(each, marks=pytest.mark.campaign)
+            for each in (
+                "inspect log.csv --report r.html",
+                "convert cal.json --to kalibr --out k.yaml",
+                "allan log.csv --out n.json",
+            )
+        ),
     ],
 )
 def test_json_that_cannot_be_written_is_one_line(command, folder):

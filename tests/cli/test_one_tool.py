@@ -221,7 +221,10 @@ def test_every_result_has_the_same_keys_in_the_same_order(results):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["selfcal", "aoa", "calibrate turntable"])
+@pytest.mark.parametrize(
+    "command",
+    ["calibrate turntable", *(pytest.param(each, marks=pytest.mark.campaign) for each in ("selfcal", "aoa"))],
+)
 def test_the_temperature_of_a_result_is_that_stated_or_else_that_recorded(tmp_path, monkeypatch, command):
     """An example, or a simulated test, with a column of 21.5 and 22.5 degC by turns."""
     monkeypatch.chdir(tmp_path)

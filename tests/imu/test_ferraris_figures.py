@@ -25,7 +25,7 @@ ALL = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+@pytest.mark.parametrize("name", ["ferraris", pytest.param("ferraris-si", marks=pytest.mark.campaign)])
 def test_pictures_of_the_shipped_sessions(name):
     found = calibrate_ferraris(record_of(name), UNSURE, options_of(name))
     drawn = pictures(found)

@@ -15,7 +15,7 @@ from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
 from rows import for_each
 
 
-@pytest.mark.parametrize("tremor", [(0.05, 0.02), (0.01, 0.004)])
+@pytest.mark.parametrize("tremor", [(0.05, 0.02), pytest.param((0.01, 0.004), marks=pytest.mark.campaign)])
 def test_five_units_held_in_the_hand_at_the_start(tremor):
     """Five starts in the hand for 20 s: u of the accelerometers as after a quiet start, errors those of chi-square.
 

@@ -334,7 +334,7 @@ def written_by_many(place, processes, count):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("count", [30, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_eight_processes_lose_and_double_nothing(store, place, count):
     """8 writers at the same time: each result once, each instrument once, the chain whole."""
     written_by_many(place[0], 8, count)

@@ -18,7 +18,7 @@ def result_of(name, seed=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["none", "no walk, stated as 0"])
+@pytest.mark.parametrize("name", ["none", pytest.param("no walk, stated as 0", marks=pytest.mark.campaign)])
 def test_a_sound_record_of_another_simulator_is_ok_and_met(name):
     """With walks that the study leaves to the recording u is rather too large, for no record excludes small ones: the
     squared error may be half of what chance leaves."""

@@ -90,7 +90,7 @@ def test_noise_that_the_record_shows_is_that_found_by_hand():
     assert found.statistics["turn_residual_rms"] == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_halves_of_the_record_agree():
     """Within the 99 % range of the rms of as many."""
     one, two = (calibrated(recording(*part), *ALL, **WALKS) for part in ((0, 25587), (25587, None)))

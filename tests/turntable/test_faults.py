@@ -52,7 +52,7 @@ LARGE = [
 @pytest.mark.parametrize(
     ("name", "faults", "code", "draws"),
     [
-        *((*each, 8) for each in LARGE[:4]),
+        *((*each, 4) for each in LARGE[:4]),
         *(pytest.param(*each, 50, marks=pytest.mark.campaign) for each in LARGE),
     ],
 )

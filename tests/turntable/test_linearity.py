@@ -66,7 +66,7 @@ def truth(rate, deviation, way):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("runs", [12, pytest.param(250, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("runs", [6, pytest.param(250, marks=pytest.mark.campaign)])
 def test_intervals_hold_whatever_the_curve_and_a_straight_gyro_looks_straight(runs):
     """2 x 5 x 2 cases of curve, size and noise: U covers, and says straight of what is straight."""
     rng = np.random.default_rng(20261122)

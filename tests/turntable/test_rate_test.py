@@ -319,9 +319,10 @@ def test_samples_of_one_stay_carry_their_own_angles():
 
 
 @pytest.mark.slow
-def test_intervals_cover_as_they_say():
-    """150 tests with noise, table errors by scope and an uncertain table rate; noise stated or not by turns."""
-    runs, level, noise = 150, 0.95, 2.0 * DEG_H
+@pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.campaign)])
+def test_intervals_cover_as_they_say(runs):
+    """Tests with noise, table errors by scope and an uncertain table rate; noise stated or not by turns."""
+    level, noise = 0.95, 2.0 * DEG_H
     truth = {"S_z": 1.0, "D_F_z": 5.0 * DEG_H, "S_asym_z": 20e-6}
     # coarse enough that misalignment of second order takes part
     told = {"coefficients": truth, "noise": noise}
@@ -341,9 +342,10 @@ def test_intervals_cover_as_they_say():
 
 
 @pytest.mark.slow
-def test_a_bias_is_covered_where_the_table_scatters_more_than_the_noise():
+@pytest.mark.parametrize("runs", [50, pytest.param(150, marks=pytest.mark.campaign)])
+def test_a_bias_is_covered_where_the_table_scatters_more_than_the_noise(runs):
     """Noise that is not stated hides behind table errors of 30 arcmin: its few degrees of freedom must count."""
-    runs, level, bias = 150, 0.95, 5.0 * DEG_H
+    level, bias = 0.95, 5.0 * DEG_H
     told = {"coefficients": {"S_z": 1.0, "D_F_z": bias}, "noise": 2.0 * DEG_H}
     settings = study(UP_AND_DOWN, normal(30.0 / 60.0 * DEG), instrument=told)
     unstated = replace(settings, instrument=replace(settings.instrument, noise=None))
