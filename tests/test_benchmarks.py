@@ -245,6 +245,18 @@ def test_a_run_without_end_is_ended_in_any_thread(monkeypatch):
     assert runs.one("drift", 3).outcome == expected.outcome
 
 
+def test_a_run_that_keeps_its_end_for_itself_goes_on_all_the_same():
+    """Whatever is caught on the way, the lock of the runs is free again."""
+    runs = importlib.import_module("absurd.runs")
+    with runs.limited(0.05):
+        try:
+            while True:
+                pass
+        except Exception:  # as code that takes any error for an answer
+            kept = True
+    assert kept
+
+
 def test_a_run_within_its_time_leaves_nothing_behind():
     """In a process whose lines are traced, as for coverage: it would go on with the same step for ever."""
     code = (

@@ -47,10 +47,11 @@ def judged(case, settings=study(), seeds=SEEDS, **tunnel):  # noqa: B008  (froze
 
 @pytest.mark.parametrize("late", ["0.5", "1", "5"])
 def test_a_late_gyro_costs_nothing(late):
-    """0.5 to 5 ms that nobody states: 0.03 to 0.44 deg where they are taken for none; 1.4 u of three draws."""
+    """0.5 to 5 ms that nobody states: 0.03 to 0.44 deg where they are taken for none. Of three draws of
+    constants the rms over u is below the root of 16.3 / 3 with 99.9 %."""
     error, ratio, filtered, of = judged(f"gyro late {late} ms")
     assert error < 0.02
-    assert ratio < 1.4
+    assert ratio < np.sqrt(16.3 / SEEDS)
     at = of.names.index("tau_g")
     u = np.sqrt(filtered.state.P[at, at])
     assert u < 5e-5
@@ -62,7 +63,7 @@ def test_where_nothing_shows_a_delay_it_is_not_learned_from_noise(kind):
     """An acceleration that is only noise multiplies a delay: unguarded, the filter was sure of one by 60 u off."""
     error, ratio, filtered, of = judged("quiet", kind=kind)
     assert error < 0.02
-    assert ratio < 1.4
+    assert ratio < np.sqrt(16.3 / SEEDS)
     at = of.names.index("tau_g")
     assert abs(filtered.state.x[at]) < 3.0 * np.sqrt(filtered.state.P[at, at])
 

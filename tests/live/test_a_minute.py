@@ -100,8 +100,7 @@ def test_every_row_is_used_or_counted(seconds, study, tmp_path, broker, monkeypa
             assert counts.lost == 0
     print(f"the sender was {behind:.3f} s behind at most; memory {early:.1f} MiB, then {late:.1f} MiB")
     assert more < 500 * seconds  # an object for each row of one wire would be 667
-    assert (
-        late - early < 24.0
-    )  # 150 bytes for each row of all wires; what waits on a busy machine is a part of it
+    # 150 bytes for each row of all wires, and what waits on a busy machine
+    assert late - early < 12.0 + 0.2 * seconds
     cable.close()
     listening.close()

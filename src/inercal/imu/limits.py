@@ -108,7 +108,8 @@ class Limits:
     """Turns that a fit of the gyro needs: each gives two equations for twelve parameters."""
 
     driver_probability: float = 1e-3
-    """Probability below which a dependence of the gyro's bias on time or pose is not put down to chance."""
+    """Probability below which a drift of biases or scale factors, or a dependence of the gyro's bias on the pose, is
+    not put down to chance."""
 
     # rows of means, known rates and turns
 

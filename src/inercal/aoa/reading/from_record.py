@@ -32,7 +32,8 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     The record has ``t``, the accelerometers of the study's layout, and where present ``gyro``,
     ``gyro_roll`` and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks
     are interpolated. There is one row for each of the accelerometers; samples that are missing, saturated (at or beyond
-    the stated range, or flat at an extreme) or stuck are NaN, and so are absent sensors; findings name them.
+    the stated range, or at an extreme at which a
+    sensor stays elsewhere) or stuck are NaN, and so are absent sensors; findings name them.
 
     Raises
     ------
@@ -207,7 +208,8 @@ def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[F
 
 def _left_out(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
     """Findings on the samples of a sensor that are left out."""
-    at_end = "flat at an extreme" if how.range is None else "at or beyond the range, or flat at an extreme"
+    extreme = "at an extreme where it stays"
+    at_end = extreme if how.range is None else f"at or beyond the range, or {extreme}"
     groups = (
         ("saturation", out, f"{at_end}, left out"),
         ("dead_channel", stuck, "of one number while the others go on, left out as stuck"),

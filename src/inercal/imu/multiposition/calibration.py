@@ -160,7 +160,7 @@ def _left_out(
         yield bias_drift_finding(joint, bias, recording.accelerometer.unit.symbol, uncertainty)
     if (scale := stand.get("scale")) is not None:
         yield scale_drift_finding(joint, scale, uncertainty)
-    if fitted.gyro is not None:
+    if fitted.gyro is not None and bias is None and scale is None:
         yield from gyro_scale_drift(fitted.gyro, poses.times, joint.names, uncertainty)
     size = k2_size(settings, fitted.scatter.s)
     yield from squares_finding(joint, poses.means, uncertainty, settings, size, stand.get("squares"))

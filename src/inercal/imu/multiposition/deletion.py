@@ -116,25 +116,28 @@ class LinearFit:
         """
         from scipy.special import fdtrc
 
-        X, r = columns.reshape(self.residuals.size, -1), self.residuals.ravel()
-        q, dof = X.shape[1], self.dof - X.shape[1]
+        X, r, q = columns.reshape(self.residuals.size, -1), self.residuals.ravel(), columns.shape[2]
         variance = self.variance()
         Q = self.weights(variance)
-        K = X.T @ Q @ X
-        size = np.sqrt(np.maximum(np.diag(K), 0.0))
-        if dof < 1 or not np.all(size > 0.0) or np.linalg.matrix_rank(K / np.outer(size, size), tol=1e-6) < q:
+        _, J, _ = self._whitened(variance)
+        white = replace(self, jacobian=columns)._whitened(variance)[1]
+        inverse = self._inverse(J)
+        # the variance is known by what these rows say of it, however weakly the others fix the parameters
+        dof = float(r.size - np.sum((J @ inverse) * J)) - q
+        K, size = X.T @ Q @ X, np.linalg.norm(white, axis=0)
+        if dof < LIMITS.outlier_dof or not np.all(size > 0.0):
+            return None
+        if np.linalg.eigvalsh(K / np.outer(size, size)).min() < 1e-9:
             return None
         pull = X.T @ Q @ r
         unit = np.linalg.inv(K)
         gained = float(pull @ unit @ pull)
-        left = max(float(r @ Q @ r) - gained, 1e-300) / dof
-        _, J, _ = self._whitened(variance)
-        white = replace(self, jacobian=columns)._whitened(variance)[1]
+        left = max(float(r @ Q @ r) - gained, 1e-300) / (self.dof - q)
         return Added(
             np.asarray(-unit @ pull),
             np.sqrt(np.diag(unit) * left),
             float(fdtrc(q, dof, gained / q / left)),
-            np.asarray(self._inverse(J) @ J.T @ white),
+            np.asarray(inverse @ J.T @ white),
         )
 
     def variance(self) -> float:

@@ -61,7 +61,7 @@ def _drift_shown(
         of = effects(joint, in_force.reshape(-1, 3))
         found = shown(joint, of, noise, noise_dof, tries=len(courses))
         if found is not None and (best is None or found.probability < best.shown.probability):
-            best = Tested(of, found, LIMITS.driver_probability)
+            best = Tested(of, found, LIMITS.driver_probability, len(courses))
     return None if best is None or best.shown.probability > best.limit else best
 
 
@@ -81,12 +81,15 @@ def gyro_scale_drift(
     gyro: GyroFit, times: Array, names: tuple[str, ...], uncertainty: Uncertainty
 ) -> Iterator[Finding]:
     """A finding where the turns show that the gyro's scale factors change evenly with ``times`` (n,) [s] of the poses;
-    harm to the coefficients ``names`` as with biases."""
+    harm to the coefficients ``names`` as with biases.
+
+    Accelerometers that drift make verticals wrong, and so the turns: where they are found to, this is not asked.
+    """
     at = 0.5 * (times[gyro.first] + times[gyro.first + 1])
     through = (at - np.mean(at)) / np.ptp(times)
     columns = gyro.linear.jacobian[:, :, SCALES] * gyro.model.scale * through[:, None, None]
     found = gyro.linear.added(columns)
-    if found is None or found.probability > LIMITS.driver_probability:
+    if found is None or not found.probability <= LIMITS.driver_probability:
         return
     shifts = dict(
         zip(gyro.names, found.shifts @ found.estimate, strict=False)

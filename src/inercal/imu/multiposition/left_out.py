@@ -31,11 +31,13 @@ class Shown(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """Errors with their ``effects``, ``shown`` by the poses with a probability below ``limit``."""
+    """Errors with their ``effects``, ``shown`` by the poses with a probability below ``limit``, as the likeliest of so
+    many ``tries``."""
 
     effects: Effects
     shown: Shown
     limit: float
+    tries: int = 1
 
 
 def in_words(found: Shown | Added, size: float = 1.0) -> str:
@@ -110,7 +112,7 @@ def unexplained(
         return stand
 
     def gone(one: Tested, other: Tested) -> bool:
-        left = shown(joint, one.effects, noise, noise_dof, other.effects)
+        left = shown(joint, one.effects, noise, noise_dof, other.effects, one.tries)
         return left is None or left.probability > one.limit
 
     return {
