@@ -19,6 +19,7 @@ def criteria(p, rng):
     return (D, a_criterion(rng.standard_normal((p, p))), i_criterion(rng.standard_normal((20, p))))
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize(
     ("c", "p", "q", "n"), [(1, 3, 0, 3), (1, 3, 2, 4), (2, 3, 1, 3), (2, 4, 2, 2), (3, 4, 1, 2)]
 )
@@ -85,6 +86,7 @@ def test_efficiency_of_d_optimal_designs(n, least, half_step):
     assert found.value == pytest.approx(-9.0 * np.log(n * efficiency(plan)), rel=1e-9)
 
 
+@pytest.mark.kernels
 def test_scaling_of_the_coefficients_leaves_the_d_optimal_positions():
     """The determinant changes by a factor that is the same for all designs."""
     candidates = with_rates(grid((12, 12)), 0.7)
@@ -96,6 +98,7 @@ def test_scaling_of_the_coefficients_leaves_the_d_optimal_positions():
     assert second.value == pytest.approx(first.value - 2.0 * np.log(size).sum(), abs=1e-6)
 
 
+@pytest.mark.kernels
 @settings(deadline=None, max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_order_of_candidates_does_not_matter(seed):
@@ -108,6 +111,7 @@ def test_order_of_candidates_does_not_matter(seed):
     assert set(order[second.chosen]) == set(first.chosen)
 
 
+@pytest.mark.kernels
 def test_same_seed_same_design():
     candidates = drift(grid((12, 12)))
     first, second = (exchange(candidates, 12, D, np.random.default_rng(9), starts=3) for _ in range(2))
@@ -116,6 +120,7 @@ def test_same_seed_same_design():
     assert np.all(np.diff(first.chosen) > 0)
 
 
+@pytest.mark.kernels
 def test_constant_errors_move_the_design():
     """With slope errors that stay constant, the design on the absolute covariance is better than the plain one."""
     x = np.linspace(-1.0, 1.0, 41)
@@ -128,6 +133,7 @@ def test_constant_errors_move_the_design():
     assert best.value < 0.97 * criterion.value(covariance(absolute.take(plain_design.chosen)))
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize(
     ("n", "repeats", "message"),
     [
@@ -144,6 +150,7 @@ def test_designs_that_cannot_be(n, repeats, message):
     assert message in str(caught.value)
 
 
+@pytest.mark.kernels
 def test_observations_that_repeat_each_other():
     """Two equal readings of each position count as one: two positions do not tell three coefficients."""
     rows = np.repeat(np.random.default_rng(6).standard_normal((8, 1, 3)), 2, axis=1)

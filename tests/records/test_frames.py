@@ -32,11 +32,13 @@ def check_of(name, data):
     return int(value(np.frombuffer(data, np.uint8), 0, len(data), form, check.table))
 
 
+@pytest.mark.kernels
 def test_crcs_have_their_published_check_values():
     assert PUBLISHED.keys() == {name for name in CHECKS if name.startswith("crc")}
     assert {name: check_of(name, b"123456789") for name in PUBLISHED} == PUBLISHED
 
 
+@pytest.mark.kernels
 @given(st.binary(max_size=60))
 def test_checks_agree_with_those_of_other_programs(data):
     assert check_of("crc-32", data) == zlib.crc32(data)
@@ -47,6 +49,7 @@ def test_checks_agree_with_those_of_other_programs(data):
     assert check_of("xor-8", data) == int(np.bitwise_xor.reduce(np.frombuffer(data, np.uint8), initial=0))
 
 
+@pytest.mark.kernels
 def test_fletcher_has_the_values_of_its_literature():
     """abcde of the usual example; a message of a u-blox receiver (poll of UBX-MON-VER) with its own check bytes."""
     assert check_of("fletcher-16", b"abcde") == 0xC8F0
@@ -72,12 +75,14 @@ def framed(frame, *values):
     return body + struct.pack("<H" if frame.order == "<" else ">H", crc)
 
 
+@pytest.mark.kernels
 def test_fields_have_their_types_and_byte_order():
     found = frames_in(framed(FRAME, 7, 123456, 1.5, -2), FRAME)
     assert found.rows.tolist() == [(7, 123456, 1.5, -2)]
     assert found[1:] == (15, 0, 0)
 
 
+@pytest.mark.kernels
 @given(
     st.lists(
         st.one_of(
@@ -112,6 +117,7 @@ def test_every_frame_is_found_and_every_other_byte_passed_over(parts, data):
     assert whole.passed_over + 15 * len(wanted) == whole.consumed
 
 
+@pytest.mark.kernels
 def test_a_damaged_frame_takes_no_sound_one_with_it():
     frames = [framed(FRAME, k, k, float(k), k) for k in range(100)]
     spoiled = bytearray(b"".join(frames))
@@ -122,6 +128,7 @@ def test_a_damaged_frame_takes_no_sound_one_with_it():
     assert (found.passed_over, found.damaged) == (15 + 14, 2)
 
 
+@pytest.mark.kernels
 def test_counters_go_on_beyond_their_range():
     counter = np.array([254, 255, 0, 3, 2, 4, 100], np.uint8)
     turns, numbers = Turns().on(counter)
@@ -156,6 +163,7 @@ sign = -1
 """
 
 
+@pytest.mark.kernels
 def test_a_file_of_frames_is_read(tmp_path):
     (tmp_path / "map.toml").write_text(MAP)
     stamps = [2**32 - 2000 + 1000 * k for k in range(6)]
@@ -175,6 +183,7 @@ def test_a_file_of_frames_is_read(tmp_path):
         read(tmp_path / "none.bin", tmp_path / "map.toml")
 
 
+@pytest.mark.kernels
 @for_each(
     "old, new, said",
     [
@@ -197,6 +206,7 @@ def test_what_is_wrong_in_a_frame_is_said(tmp_path, old, new, said):
     assert said in str(refused.value)
 
 
+@pytest.mark.kernels
 def test_bytes_of_no_use_are_passed_over(tmp_path):
     """Those between the fields (x3), and those before the check by the length; the check begins behind the sync."""
     text = """

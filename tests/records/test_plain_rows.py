@@ -13,6 +13,9 @@ from inercal.records.read.plain_rows import LEAST, MOST, fives, plain_rows
 
 COMMA = b",.\n#%"
 
+# of integers of 64 bits, as compiled kernels do without a word
+pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered")
+
 
 def numbers_of(texts):
     """The numbers of texts, a line each, and how many of them are plain before the first that is not."""
@@ -28,6 +31,7 @@ def same(texts):
     return len(found) == len(wanted) and np.array_equal(found.view(np.int64), wanted.view(np.int64))
 
 
+@pytest.mark.kernels
 def test_numbers_are_the_nearest_floats():
     """Of every size, with 1 to 19 digits, in every notation, and halfway between two floats."""
     rng = np.random.default_rng(20261123)
@@ -49,6 +53,7 @@ def test_numbers_are_the_nearest_floats():
     )
 
 
+@pytest.mark.kernels
 @given(
     st.floats(allow_nan=False, allow_infinity=False, min_value=-1e299, max_value=1e299), st.integers(0, 40)
 )
@@ -65,6 +70,7 @@ def test_what_is_plain_is_right(value, places):
             assert len(written) > 19 or abs(value) < 1e-290
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize(
     "written",
     [
@@ -90,6 +96,7 @@ def test_what_is_no_plain_number_is_left(written):
     assert len(numbers_of([written, "1"])) == 0 or written == "1,"  # a delimiter may end a line
 
 
+@pytest.mark.kernels
 def test_powers_of_five_have_128_bits():
     """Cut off, but for 5^-27 to 5^-1, which are rounded up, as exact whole numbers say."""
     table = fives()
@@ -116,6 +123,7 @@ LINES = st.one_of(
 )  # fmt: skip
 
 
+@pytest.mark.kernels
 @given(
     st.lists(LINES, min_size=1, max_size=30),
     st.sampled_from([(",", "."), (";", ","), (";", "."), ("\t", "."), (None, "."), (";", "")]),

@@ -54,6 +54,7 @@ def test_of_the_papers_errors_it_is_off_by_their_products():
         assert found.nis_mean == pytest.approx(6.0, abs=0.15)
 
 
+@pytest.mark.kernels
 def test_errors_of_attitudes_take_the_nearer_sign():
     q = boxplus(np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), np.array([[2e-6, 0.0, 0.0]] * 3))
     reference = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
@@ -65,6 +66,7 @@ def test_errors_of_attitudes_take_the_nearer_sign():
     assert (x, angle) == (pytest.approx(1e-6), pytest.approx(2e-6))
 
 
+@pytest.mark.kernels
 def test_changes_of_the_turn_are_found():
     """z for 60 s, 10 s of rest, x for 30 s; the ends of a record are none."""
     th, t = SHORT.angles(), 0.2 * np.arange(501)

@@ -88,6 +88,7 @@ def test_turns_about_one_axis_leave_many_at_their_prior():
     assert min(left[name] for name in ("T_xy", "T_yx", "M_xy", "S_x", "S_y")) > 0.8
 
 
+@pytest.mark.kernels
 def test_attitudes_are_stated_as_they_are_read():
     for C in attitudes(Plan(start=(0.3, -0.4, 1.0))) + attitudes(Plan()):
         assert start_attitude(Plan(start=angles_of(C))) == pytest.approx(C, abs=1e-12)
@@ -195,6 +196,7 @@ def test_a_found_plan_is_a_table_of_a_study(folder, capsys):
     assert sum(len(each["tells"]) > 0 for each in whole["by_turn"]) == 5
 
 
+@pytest.mark.kernels
 def test_what_cannot_be_designed_is_said(folder):
     text = (folder / "strapdown.toml").read_text("utf-8")
     without = text.partition("[plan]")[0]
@@ -210,6 +212,7 @@ def test_what_cannot_be_designed_is_said(folder):
         ic.design("strapdown.toml", "positions")
 
 
+@pytest.mark.kernels
 def test_the_named_path_visits_19_positions():
     seen = [start_attitude(plan())]
     for axis, angle in NINETEEN:

@@ -51,6 +51,7 @@ def test_the_filter_is_the_batch_in_twenty_runs(grade):
         agree(grade, seed)
 
 
+@pytest.mark.kernels
 def test_one_step_is_that_of_matrices():
     """Prediction and update of the kernels against the equations of Kalman as matrices."""
     rng = np.random.default_rng(3)
@@ -170,6 +171,7 @@ def test_a_stream_goes_on_where_it_was_stopped(live, tmp_path, capsys):
     assert list(rows.values())[-2:] == whole[-2:]
 
 
+@pytest.mark.kernels
 def test_what_a_stream_does_not_take_is_said(live, tmp_path, capsys):
     study, record = live
     assert run(["calibrate", "strapdown", record, "--study", study, "--stream", "--filter", "batch"]) == 2

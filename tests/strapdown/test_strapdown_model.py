@@ -151,6 +151,7 @@ def test_block_elimination_is_dense_algebra(settings):
     assert found.redundancy.sum() < m * (nodes - 1)
 
 
+@pytest.mark.kernels
 def test_an_accelerometer_outward_on_a_turn_reads_less():
     """A turn about z at the rate w: at r_xx > 0 the x accelerometer reads -w^2 r_xx; late sensors read what was."""
     rate, ts, count = 1.5, 0.01, 400
@@ -163,6 +164,7 @@ def test_an_accelerometer_outward_on_a_turn_reads_less():
     assert motion.f[10:-10, 1:] == pytest.approx(level[10:-10, 1:])
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("samples", [0.3, -0.3, 1.7, 4.0])
 def test_a_delay_of_a_cubic_is_exact(samples):
     t = np.arange(60.0)
@@ -173,6 +175,7 @@ def test_a_delay_of_a_cubic_is_exact(samples):
     np.testing.assert_allclose(found[8:-8], np.diff(expected, axis=0)[8:-8], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.kernels
 def test_outputs_are_undone_exactly(run):
     """Truth -> outputs -> truth of a still unit, with K2, asymmetry and g-sensitivity."""
     c = drawn(SHORT, np.random.default_rng(1))
@@ -185,6 +188,7 @@ def test_outputs_are_undone_exactly(run):
     np.testing.assert_allclose(motion.f, np.tile(f, (9, 1)), rtol=1e-12)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("frame", ["upper", "lower"])
 def test_a_frame_is_left_and_entered_without_loss(frame):
     c = drawn(replace(NAV, terms=OPTIONS), np.random.default_rng(2))
@@ -194,6 +198,7 @@ def test_a_frame_is_left_and_entered_without_loss(frame):
     np.testing.assert_allclose(again, c, atol=1e-13)
 
 
+@pytest.mark.kernels
 def test_frames_differ_by_a_rotation_and_so_do_their_covariances():
     """Gram matrices of the gains know no frame; neither does the length of an error in units of u."""
     c = drawn(NAV, np.random.default_rng(2))
@@ -214,6 +219,7 @@ def test_frames_differ_by_a_rotation_and_so_do_their_covariances():
     assert lengths[0] == pytest.approx(len(places) * 1e-8, rel=1e-4)
 
 
+@pytest.mark.kernels
 @pytest.mark.parametrize("grade", GRADES)
 def test_the_simulated_motion_is_one_motion(grade):
     """Rate and force of the simulator's closed forms against differences of its attitude."""
