@@ -210,6 +210,8 @@ REFUSED = {
     "role\nup": "found no column file",
     "file,role,begin [s],begin [min]\nup1.csv,up,60,": "found the column 'begin' twice, expected it once",
     "file [x],role\nup1.csv,up": "found 'x' as unit of the column file, expected none",
+    "file,role,amplitude [deg\nup1.csv,up,10": "found the head 'amplitude .deg', expected a unit in brackets",
+    "file,role,amplitude deg]\nup1.csv,up,10": "found the head 'amplitude deg.', expected a unit in brackets",
     "file,role,begin [m]\nup1.csv,up,1": "begin: found '1 m', which is of length",
     "file,role,color\nup1.csv,up,red": "found the column 'color', expected file, role, angle",
     "file,role\nnone.csv,up": "row 1: file: found none.csv, which is not there",

@@ -76,7 +76,13 @@ def read_runs_table(path: str | Path) -> RunTable:
         raise InputError(path, "cannot be read as text, expected a table such as file,role") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     rows = list(csv.DictReader(io.StringIO("\n".join(lines)), skipinitialspace=True))
-    titles = [_titled(name) for name in lines[0].split(",")] if lines else []
+    written = [name.strip() for name in lines[0].split(",")] if lines else []
+    for title in written:
+        if ("[" in title) != title.endswith("]"):
+            raise InputError(
+                path, f"found the head {shown(title)}, expected a unit in brackets, as amplitude [deg]"
+            )
+    titles = [_titled(title) for title in written]
     heads = [name for name, _ in titles]
     for name, unit in titles:
         if heads.count(name) > 1:
