@@ -20,9 +20,11 @@ from inercal.selfcal.filters import gimbal
 from inercal.selfcal.filters import multiplicative
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.before.bounds import recorded_bounds
+from inercal.selfcal.before.considered import both
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform.plan import Plan, Turn
+from inercal.selfcal.platform.states import ALL
 from inercal.selfcal.settings import Filter
 from inercal.selfcal.before.simulate import experiment, simulate
 
@@ -31,12 +33,17 @@ for extended in (False, True):
     settings = study(plan=Plan((Turn("z", 0.05), Turn("x", 0.05))), filter=Filter(extended=extended))
     recording = simulate(experiment(settings), np.random.default_rng(4)).recording
     of = problem(settings)
-    for kind in ("error-state", "mukf", "svd-qukf", "gimbal-ukf"):
+    for kind in ("linear", "mukf", "svd-qukf", "gimbal-ukf", "error-state"):
         got = estimate(recording, of, kind)
         u = np.sqrt(np.diag(got.covariance))
         found[f"{kind} {extended}"] = [*(got.coefficients / of.prior), *(u / of.prior), got.nis_mean]
     path = recorded_bounds(recording, of, got.history.attitude, got.coefficients, contributions=True)
     found[f"bounds {extended}"] = [*(path.u / of.prior)]
+    names = [name for name in ALL if name not in of.states.names][:4]
+    slopes, changes = both(recording, of, got.history.attitude, got.coefficients, names, ())
+    changes /= of.prior[:, None]
+    found[f"not fitted {extended}"] = [*changes.ravel() / np.abs(changes).max()]
+    found[f"innovations {extended}"] = [*slopes.ravel() / np.abs(slopes).max()]
 kernels = [bounds.riccati, *(each._advance for each in (error_state, gimbal, multiplicative, quaternion))]
 missed = sum(sum(each.stats.cache_misses.values()) for each in kernels) if hasattr(kernels[0], "stats") else None
 print(json.dumps({"found": found, "missed": missed}))
@@ -44,7 +51,7 @@ print(json.dumps({"found": found, "missed": missed}))
 
 
 def ran(**environment):
-    """What a new process finds on a short path with all recursive filters and the bounds."""
+    """What a new process finds on a short path with all recursive filters, the bounds, and what is not fitted."""
     package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.selfcal.__file__)))
     studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
     paths = os.pathsep.join([package, studies])
