@@ -219,7 +219,7 @@ def _chunk_path(folder: Path, chunk: range) -> Path:
 def _keep(folder: Path, chunk: range, sample: Sample) -> None:
     """Write a finished chunk."""
     data = io.BytesIO()
-    np.savez(data, allow_pickle=False, **sample)
+    np.savez(data, **sample)
     write_bytes(_chunk_path(folder, chunk), data.getvalue())
 
 
