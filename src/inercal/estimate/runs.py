@@ -20,7 +20,7 @@ from concurrent.futures import Executor as Pool
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -219,7 +219,8 @@ def _chunk_path(folder: Path, chunk: range) -> Path:
 def _keep(folder: Path, chunk: range, sample: Sample) -> None:
     """Write a finished chunk."""
     data = io.BytesIO()
-    np.savez(data, **sample)
+    arrays: dict[str, Any] = dict(sample)  # allow_pickle would be an array of its own with NumPy 2.0
+    np.savez(data, **arrays)
     write_bytes(_chunk_path(folder, chunk), data.getvalue())
 
 
