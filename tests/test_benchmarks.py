@@ -246,7 +246,7 @@ def test_a_run_without_end_is_ended_in_any_thread(monkeypatch):
 
 
 def test_a_run_that_keeps_its_end_for_itself_goes_on_all_the_same():
-    """Whatever is caught on the way, the lock of the runs is free again."""
+    """Code that catches any error may catch this one too: what comes after it is reached."""
     runs = importlib.import_module("absurd.runs")
     with runs.limited(0.05):
         try:

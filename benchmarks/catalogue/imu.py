@@ -50,21 +50,25 @@ def by_file(change, draw: int, settings=SETTINGS) -> Outcome:
 
 
 def ramp(size, which):
-    """A drift from begin to end, none in the middle, of accelerometers (0) or gyros (1)."""
-
-    def change(t, acc, gyro, rng):
-        drift = size * (t / t[-1] - 0.5)[:, None] * np.array([1.0, -1.0, 1.0])
-        return (t, acc + drift, gyro) if which == 0 else (t, acc, gyro + drift)
-
-    return change
+    """A drift of biases from begin to end, none in the middle, of accelerometers (0) or gyros (1)."""
+    return _added(size, which, lambda t: t / t[-1] - 0.5)
 
 
 def warming(size, which, over=30.0):
     """A bias that dies away over 30 s, as a unit warms up, less its mean, of accelerometers (0) or gyros (1)."""
 
-    def change(t, acc, gyro, rng):
+    def course(t):
         left = np.exp(-t / over)
-        drift = size * (left - left.mean())[:, None] * np.array([1.0, -1.0, 1.0])
+        return left - left.mean()
+
+    return _added(size, which, course)
+
+
+def _added(size, which, course):
+    """Biases that take a course (n,) of time, its sign other on y."""
+
+    def change(t, acc, gyro, rng):
+        drift = size * course(t)[:, None] * np.array([1.0, -1.0, 1.0])
         return (t, acc + drift, gyro) if which == 0 else (t, acc, gyro + drift)
 
     return change

@@ -41,7 +41,7 @@ def drawn_run(number, fixed, rng):
 @pytest.mark.slow
 @pytest.mark.parametrize("times", [20, pytest.param(60, marks=pytest.mark.campaign)])
 def test_combined_runs_cover_what_changes_and_what_does_not(times):
-    """Often four runs on one table: DX_F that changes at turn-on, DX_X that the constant errors shift in all."""
+    """Four runs on one table, many times: DX_F that changes at turn-on, DX_X that the constant errors shift in all."""
     rng, ratios = np.random.default_rng(20261122), []
     held = dict.fromkeys(("DX_F", "DX_X", "DX_Y", "DX_XX"), 0)
     for _ in range(times):

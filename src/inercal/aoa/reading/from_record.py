@@ -32,8 +32,8 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
     The record has ``t``, the accelerometers of the study's layout, and where present ``gyro``,
     ``gyro_roll`` and ``gyro_yaw``, ``point``, ``trigger``, ``theta_ref`` and ``temperature``; columns on other clocks
     are interpolated. There is one row for each of the accelerometers; samples that are missing, saturated (at or beyond
-    the stated range, or at an extreme at which a
-    sensor stays elsewhere) or stuck are NaN, and so are absent sensors; findings name them.
+    the stated range, or at an extreme at which a sensor stays elsewhere) or stuck are NaN, and so are absent
+    sensors; findings name them.
 
     Raises
     ------

@@ -19,8 +19,8 @@ from inercal.imu.multiposition.gyro import GyroFit
 from inercal.imu.multiposition.joint import Joint
 from inercal.imu.multiposition.left_out import Tested, effects, harmed, in_words, shown
 
-PPM = 1e-6
-SCALES = slice(3, 6)
+_PPM = 1e-6
+_SCALES = slice(3, 6)
 """Places of the scale factors among the parameters of a gyro."""
 
 _SETTLING = (3.0, 10.0)
@@ -87,16 +87,15 @@ def gyro_scale_drift(
     """
     at = 0.5 * (times[gyro.first] + times[gyro.first + 1])
     through = (at - np.mean(at)) / np.ptp(times)
-    columns = gyro.linear.jacobian[:, :, SCALES] * gyro.model.scale * through[:, None, None]
+    columns = gyro.linear.jacobian[:, :, _SCALES] * gyro.model.scale * through[:, None, None]
     found = gyro.linear.added(columns)
     if found is None or not found.probability <= LIMITS.driver_probability:
         return
-    shifts = dict(
-        zip(gyro.names, found.shifts @ found.estimate, strict=False)
-    )  # then the unknown parts of earth rate
+    # beyond the names follow the unknown parts of earth rate
+    shifts = dict(zip(gyro.names, found.shifts @ found.estimate, strict=False))
     yield Finding(
         "trend",
-        f"the scale factors of the gyro change over the recording by {in_words(found, PPM)} ppm: {_CURE}",
+        f"the scale factors of the gyro change over the recording by {in_words(found, _PPM)} ppm: {_CURE}",
         harm=tuple(
             name for name, u in zip(names, uncertainty.u, strict=True) if abs(shifts.get(name, 0.0)) > u
         ),
@@ -107,7 +106,7 @@ def scale_drift_finding(joint: Joint, found: Tested, uncertainty: Uncertainty) -
     """The finding about scale factors that drift; harm as with biases."""
     return Finding(
         "trend",
-        f"the scale factors of the accelerometers change over the recording by {in_words(found.shown, PPM)} ppm: "
+        f"the scale factors of the accelerometers change over the recording by {in_words(found.shown, _PPM)} ppm: "
         f"{_CURE}",
         harm=harmed(found, joint.names, uncertainty.u),
     )

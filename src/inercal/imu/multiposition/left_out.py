@@ -76,8 +76,8 @@ def shown(
     ``noise`` is the variance [(m/s^2)^2] of |f| that the sensors' noise explains, with ``noise_dof`` degrees of
     freedom, 0 where it is not known; it is pooled with what the errors leave unless that is clearly more. The poses
     alone must show the errors too: a few of them cannot tell whether they scatter by more than the noise. ``beside``
-    are other errors, which are fitted with the coefficients. The probability is that of the least likely of so many
-    ``tries``, with other effects.
+    are other errors, which are fitted with the coefficients. Where these effects are the likeliest of so many
+    ``tries``, the probability is multiplied by their number.
     """
     from scipy.special import fdtrc
 
