@@ -1,5 +1,8 @@
 """Searches and sampled sensitivity by one process, two, and a cluster: the same digits."""
 
+import socket
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
@@ -60,12 +63,15 @@ def test_answers_come_in_the_order_of_their_numbers():
 
 
 @pytest.mark.slow
-def test_a_cluster_gives_the_same_digits():
+def test_a_cluster_gives_the_same_digits_whoever_has_the_port_of_dashboards():
     pytest.importorskip("distributed")
+    with socket.socket() as other:
+        with suppress(OSError):  # whoever has it already does as well
+            other.bind(("0.0.0.0", 8787))
+            other.listen()
+        of_cluster = found(TABLE, turntable.sensitivity, Cluster("local", 2))
 
-    np.testing.assert_equal(
-        found(TABLE, turntable.sensitivity, Cluster("local", 2)), found(TABLE, turntable.sensitivity, None)
-    )
+    np.testing.assert_equal(of_cluster, found(TABLE, turntable.sensitivity, None))
 
 
 @pytest.mark.parametrize("verb", [["sensitivity"], ["design", "positions"], ["design", "selfcal"]])
