@@ -26,11 +26,13 @@ quick: .venv/dev/installed
 	$(DEV)/ruff check --quiet .
 	@$(DEV)/mypy & types=$$!; $(DEV)/python tests/quick.py; tests=$$?; wait $$types && exit $$tests
 
-# Three workers for two processors: of what they run, servers and wires wait.
+# Three workers for two processors: of what they run, servers and wires wait. They find the tests parsed, once for all,
+# beside the check of types.
 test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
-	@$(DEV)/mypy & types=$$!; $(DEV)/python -m pytest -n 3 --dist worksteal -m "not campaign" --slow-rule list; \
+	@$(DEV)/mypy & types=$$!; $(DEV)/python -m pytest --collect-only -m "not campaign" >/dev/null; \
+	    $(DEV)/python -m pytest -n 3 --dist worksteal -m "not campaign" --slow-rule list; \
 	    tests=$$?; wait $$types && exit $$tests
 
 # The full numbers of runs, of which `make test` has short versions.

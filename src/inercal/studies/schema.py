@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
@@ -38,13 +40,14 @@ class TomlSchema(GenerateJsonSchema):
         return self.generate_inner(schema["schema"])
 
 
-def json_schema() -> dict[str, Any]:
+@cache
+def json_schema() -> Mapping[str, Any]:
     """JSON Schema (draft 2020-12) of study files, for editors and for checks by other programs.
 
     Returns
     -------
-    dict
-        Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
+    mapping
+        Made once, the same object for all who ask. Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
     """
     references, definitions = models_json_schema(
         [(file, "validation") for file in STUDY_FILES], schema_generator=TomlSchema

@@ -8,7 +8,6 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Literal
 
 from inercal.errors import InercalError, InputError
@@ -49,21 +48,15 @@ class Table:
     keys: tuple[Key, ...]
 
 
-@cache
-def _schema() -> Mapping[str, Any]:
-    """The JSON Schema of all studies."""
-    from inercal.studies.schema import json_schema
-
-    return json_schema()
-
-
 def tables(kind: str, text: str) -> tuple[Table, ...]:
     """The tables of a study of that kind with what ``text`` says in them, those that it has first.
 
     Raises `InputError` where the text is no TOML.
     """
+    from inercal.studies.schema import json_schema
+
     data = parsed(text)
-    definitions = _schema()["$defs"]
+    definitions = json_schema()["$defs"]
     root = definitions[f"{kind.capitalize()}StudyFile"]
     found = [each for each in _tables("", root, definitions, data, 0) if each.keys]
     given = [each for each in found if _at(data, each.name)]
