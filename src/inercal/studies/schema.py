@@ -47,7 +47,8 @@ def json_schema() -> Mapping[str, Any]:
     Returns
     -------
     mapping
-        Made once, the same object for all who ask. Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
+        Made once, the same object for all who ask.
+        Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
     """
     references, definitions = models_json_schema(
         [(file, "validation") for file in STUDY_FILES], schema_generator=TomlSchema
