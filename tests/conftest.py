@@ -80,6 +80,19 @@ def pytest_runtest_call(item):
     return (yield from timed(item, "the test"))
 
 
+@pytest.fixture(scope="module")
+def undrawn():
+    """Pictures are laid out but not written as SVG, which takes most of their time: for tests that look at none."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    def empty(canvas, file, **given):
+        file.write('<svg xmlns="http://www.w3.org/2000/svg"></svg>')
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FigureCanvasSVG, "print_svg", empty)
+        yield
+
+
 def pytest_configure(config):
     config.began, config.asked = time.monotonic(), 0
 

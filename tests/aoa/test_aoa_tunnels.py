@@ -23,7 +23,7 @@ from inercal.aoa.settings import Estimator, Prior, Resonance
 from inercal.stream.aoa_state import choice_of, chosen
 from inercal.units import STANDARD_GRAVITY
 
-SEEDS = 3
+SEEDS = 2
 BUFFETS = [name for name in CASES if name.startswith("buffet")]
 
 
@@ -47,11 +47,11 @@ def judged(case, settings=study(), seeds=SEEDS, **tunnel):  # noqa: B008  (froze
 
 @pytest.mark.parametrize("late", ["0.5", "1", "5"])
 def test_a_late_gyro_costs_nothing(late):
-    """0.5 to 5 ms that nobody states: 0.03 to 0.44 deg where they are taken for none. Of three draws of
-    constants the rms over u is below the root of 16.3 / 3 with 99.9 %."""
+    """0.5 to 5 ms that nobody states: 0.03 to 0.44 deg where they are taken for none. Of two draws of
+    constants the rms over u is below the root of 13.8 / 2 with 99.9 %."""
     error, ratio, filtered, of = judged(f"gyro late {late} ms")
     assert error < 0.02
-    assert ratio < np.sqrt(16.3 / SEEDS)
+    assert ratio < np.sqrt(13.8 / SEEDS)
     at = of.names.index("tau_g")
     u = np.sqrt(filtered.state.P[at, at])
     assert u < 5e-5
@@ -63,7 +63,7 @@ def test_where_nothing_shows_a_delay_it_is_not_learned_from_noise(kind):
     """An acceleration that is only noise multiplies a delay: unguarded, the filter was sure of one by 60 u off."""
     error, ratio, filtered, of = judged("quiet", kind=kind)
     assert error < 0.02
-    assert ratio < np.sqrt(16.3 / SEEDS)
+    assert ratio < np.sqrt(13.8 / SEEDS)
     at = of.names.index("tau_g")
     assert abs(filtered.state.x[at]) < 3.0 * np.sqrt(filtered.state.P[at, at])
 
@@ -95,7 +95,7 @@ def test_vibration_as_small_as_is_usual_makes_no_offset_to_speak_of():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["sine", "polar", "rest"])
+@pytest.mark.parametrize("kind", ["sine", pytest.param("polar", marks=pytest.mark.campaign), "rest"])
 def test_in_a_buffet_the_snap_is_that_of_the_data(kind):
     """5 to 40 Hz, 0.05 to 0.3 deg rms: with the usual snap 3.5 u to 3900 u off; of ten draws, 1.4 u."""
     ratios = []
@@ -298,8 +298,8 @@ def test_a_scale_of_the_gyro_that_no_reading_shows_is_told_with_what_it_costs():
 
 def test_a_gyro_that_is_no_such_gyro_has_a_wider_prior_and_u_holds():
     """1 % under one sine, where positions and heights take nearly all of it: 5 u off under the usual prior of 0.1 %.
-    Without a choice of the recording it is `prior_suspect`. Of three draws of constants the mean square over u^2 is
-    below 16.3 / 3 with 99.9 %."""
+    Without a choice of the recording it is `prior_suspect`. Of two draws of constants the mean square over u^2 is
+    below 13.8 / 2 with 99.9 %."""
     squares, late = [], slice(1000, None)
     for seed in range(SEEDS):
         run = simulate(Tunnel(duration=15.2), seed)
@@ -314,7 +314,7 @@ def test_a_gyro_that_is_no_such_gyro_has_a_wider_prior_and_u_holds():
         squares.append(np.mean(np.square((found.theta - run.theta)[late] / found.u[late])))
         k = of.names.index("k_g")
         assert abs(found.state.x[k] - 0.01) < 4.0 * np.sqrt(found.state.P[k, k])
-    assert np.mean(squares) < 16.3 / SEEDS
+    assert np.mean(squares) < 13.8 / SEEDS
     (said,) = unseen(recording, problem(study()), study())
     assert said.code == "prior_suspect"
     assert said.harm
@@ -332,14 +332,13 @@ def test_another_error_is_not_taken_for_a_scale_of_the_gyro(change, words):
     """Under one sine a turned axis or a wrong position looks like a scale of up to 2 %; with a prior that allows for
     that nothing contradicted it, and the angle was 5 to 25 u off with `ok`."""
     stated = change(study())
-    for seed in range(2):
-        run = simulate(Tunnel(duration=15.2), seed)
-        recording = plain(run.t, run.acc, run.gyro)
-        settings = decided(recording, stated)
-        assert settings.prior.gyro_scale == stated.prior.gyro_scale
-        found = diagnose(recording, settings) or unseen(recording, problem(settings), settings)
-        (said,) = (each for each in found if each.harm)
-        assert re.search(words, said.message)
+    run = simulate(Tunnel(duration=15.2), 1)
+    recording = plain(run.t, run.acc, run.gyro)
+    settings = decided(recording, stated)
+    assert settings.prior.gyro_scale == stated.prior.gyro_scale
+    found = diagnose(recording, settings) or unseen(recording, problem(settings), settings)
+    (said,) = (each for each in found if each.harm)
+    assert re.search(words, said.message)
 
 
 def test_arms_in_millimetres_are_named_where_the_motion_is_too_slow_to_show_them():
@@ -370,7 +369,7 @@ def test_a_turned_axis_that_nothing_shows_is_told_with_what_it_costs():
 @pytest.mark.parametrize("kind", ["sine", "polar", "rest"])
 def test_a_gyro_as_it_is_usual_keeps_its_prior(kind):
     """By a recording alone its scale is off by no more than it says, whatever the motion shows of it: 3.6 standard
-    deviations of one of three draws with 99.9 %."""
+    deviations of one of two draws with 99.9 %."""
     for seed in range(SEEDS):
         run = simulate(Tunnel(kind, duration=12.0), seed)
         recording, of = plain(run.t, run.acc, run.gyro), problem(study())

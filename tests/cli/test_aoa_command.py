@@ -19,6 +19,8 @@ from inercal.cli import run
 from inercal.estimate.files import load
 from rows import for_each
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
 SUFFIXES = [".csv", ".npz", ".h5", ".parquet", ".nc"]
@@ -286,7 +288,7 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     assert "the stream contradicts the model: mean NIS" in err
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @POSIX
 def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
     """Killed without warning, while it works: each row is answered, and always with the same digits."""

@@ -17,6 +17,8 @@ from inercal.cli.tree import COMMANDS, app
 from inercal.examples import EXAMPLES, FOLDER
 from rows import for_each
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def inercal(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""

@@ -24,6 +24,8 @@ from inercal.studies.load import (
     load_turntable_study,
 )
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 BAD_VERDICT = 1
 OPTION = re.compile(r"^ {2}(--[\w-]+)(?: (PATH|STR\.\.\.|STR|INT|CHOICE))?: (.*)$", re.MULTILINE)
 READ_A_RECORD = {

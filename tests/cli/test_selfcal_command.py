@@ -22,6 +22,8 @@ from inercal.selfcal.platform.coefficients import NAMES
 from inercal.studies.load import load_selfcal_study
 from rows import for_each
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
 SELFCAL = ["selfcal", "platform.csv", "--study", "selfcal.toml"]

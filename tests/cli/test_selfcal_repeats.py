@@ -11,6 +11,8 @@ from inercal.examples import FOLDER
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.studies.load import load_selfcal_study
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 SHORT = ["--set", 'plan.turns=[["x", "-60 deg"], ["z", "-90 deg"], ["x", "-60 deg"]]']
 STUDY = FOLDER / "selfcal.toml"
 RUNS = ["run1.npz", "run2.npz", "run3.npz"]

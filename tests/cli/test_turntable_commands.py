@@ -13,6 +13,8 @@ from inercal.cli import run
 from inercal.rigs.plans import named
 from rows import for_each
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 STUDY = """
 [site]
 latitude = "39.1 deg"

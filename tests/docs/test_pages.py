@@ -26,19 +26,16 @@ SLOW = [
     "docs/how-to/calibrate-an-imu.md",
     "docs/how-to/calibrate-a-strapdown-unit.md",
     "docs/how-to/calibrate-on-a-turntable.md",
-    "docs/how-to/design-a-path.md",
     "docs/how-to/live.md",
     "docs/how-to/measure-by-wire.md",
     "docs/how-to/noise.md",
     "docs/how-to/on-a-table-with-known-angles.md",
-    "docs/how-to/poses-or-turns.md",
     "docs/how-to/read-your-files.md",
     "docs/how-to/rig-of-two-axes.md",
     "docs/how-to/several-records.md",
     "docs/how-to/temperature.md",
     "docs/how-to/tolerances-from-a-goal.md",
     "docs/how-to/use-a-cluster.md",
-    "docs/how-to/validate.md",
     "docs/published/continuous-self-calibration.md",
     "docs/published/zhao-2023.md",
     "docs/theory/angle-of-attack-fusion.md",
@@ -51,6 +48,8 @@ SLOW = [
     "docs/tutorials/turntable.md",
     "docs/tutorials/your-own-platform.md",
 ]
+#: pages that take ten seconds or more; what they run is in other tests too
+LONG = ["docs/how-to/design-a-path.md", "docs/how-to/poses-or-turns.md", "docs/how-to/validate.md"]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 EXIT = re.compile(r"\[exit (\d+)\]")
@@ -124,7 +123,9 @@ def folder(tmp_path, monkeypatch):
 
 
 def marked(page: Path) -> object:
-    return pytest.param(page, marks=[pytest.mark.slow] if name(page) in SLOW else [])
+    return pytest.param(
+        page, marks=[pytest.mark.slow] * (name(page) in SLOW) + [pytest.mark.campaign] * (name(page) in LONG)
+    )
 
 
 @pytest.mark.parametrize(
@@ -132,6 +133,7 @@ def marked(page: Path) -> object:
     [marked(p) for p in PAGES if p != APART and (blocks(p, "python") or blocks(p, "console"))],
     ids=name,
 )
+@pytest.mark.usefixtures("undrawn")
 def test_a_page_runs_and_prints_what_it_shows(page, folder, capsys):
     if page.name == "README.md":
         inercal.cli.run(["examples", "xsens", "--out", "demo", "--quiet"])

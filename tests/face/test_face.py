@@ -17,6 +17,8 @@ from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.findings import Status
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 FERRARIS = (FOLDER / "ferraris.csv.gz", FOLDER / "ferraris-map.toml")
 TABLE = {
     "latitude": "45 deg",

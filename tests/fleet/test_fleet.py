@@ -28,6 +28,8 @@ from inercal.fleet.manifest import Unit, read_manifest
 from inercal.fleet.unit import Batch, content_of, row_of, row_path
 from inercal.laboratory.store import make_store
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 TIMES = ("made", "seconds", "timing_s")
 
 

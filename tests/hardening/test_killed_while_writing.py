@@ -34,7 +34,10 @@ from inercal.laboratory.catalog import results
 from inercal.laboratory.store import open_store
 from inercal.records.read import read
 
-pytestmark = pytest.mark.skipif(os.name == "nt", reason="forks and signals as on POSIX")
+pytestmark = [
+    pytest.mark.skipif(os.name == "nt", reason="forks and signals as on POSIX"),
+    pytest.mark.usefixtures("undrawn"),
+]
 
 MKSTEMP = tempfile.mkstemp
 OLD = b"what was there before\n" * 50
@@ -390,7 +393,12 @@ STREAMS = {
 
 @pytest.mark.parametrize("name", STREAMS)
 @pytest.mark.parametrize(
-    "spoil", [killed_in_a_write, killed_before_it_is_in_place, killed_once_it_is_in_place]
+    "spoil",
+    [
+        killed_in_a_write,
+        pytest.param(killed_before_it_is_in_place, marks=pytest.mark.campaign),
+        pytest.param(killed_once_it_is_in_place, marks=pytest.mark.campaign),
+    ],
 )
 def test_a_stream_killed_while_it_saves_goes_on_with_the_same_digits(
     name, spoil, folder, tmp_path, monkeypatch, capsys

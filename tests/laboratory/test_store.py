@@ -357,7 +357,7 @@ def keep_without_end(place, seed, said):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("count", [8, pytest.param(200, marks=pytest.mark.campaign)])
 def test_a_writer_that_is_killed_leaves_results_whole_or_absent(store, place, count):
     """kill -9 at random moments: what was said to be kept is there, what is there is whole, the chain goes on."""
     rng = np.random.default_rng(20261123)

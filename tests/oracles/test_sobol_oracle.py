@@ -68,10 +68,10 @@ def test_the_estimators_of_salib(values):
 
 @pytest.mark.slow
 def test_exact_indices_of_the_two_axis_table():
-    """65536 rows of SALib at a regular and two singular attitudes agree within its own confidence."""
+    """65536 rows of SALib at a regular and a singular attitude agree within its own confidence."""
     problem = {"num_vars": len(TABLE.factors), "names": list(TABLE.factors), "bounds": [[-H, H]] * 11}
     rows = salib_points.sample(problem, 65536, calc_second_order=False, seed=35)
-    for at, name in (((0.5, 1.1), "ax"), ((0.0, 0.3), "az"), ((0.5 * np.pi + 2e-4, 0.0), "ax")):
+    for at, name in (((0.5, 1.1), "ax"), ((0.5 * np.pi + 2e-4, 0.0), "ax")):
         output = next(each for each in OUTPUTS if each.name == name)
         theirs = salib.analyze(
             problem,

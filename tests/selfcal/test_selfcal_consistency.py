@@ -20,7 +20,7 @@ ALL = pytest.mark.campaign
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", ["nominal", "low"])
+@pytest.mark.parametrize("noise", ["nominal", pytest.param("low", marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     ("kind", "runs"),
     [(kind, FEW) for kind in ("error-state", "mukf", "svd-qukf")]

@@ -70,7 +70,9 @@ def judge(settings, runs, seed, estimated=as_stated):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("grade", GRADES)
+@pytest.mark.parametrize(
+    "grade", [pytest.param(grade, marks=[pytest.mark.campaign] * (grade == "tactical")) for grade in GRADES]
+)
 def test_errors_are_as_large_as_stated(grade):
     settings = GRADES[grade]
     judge(replace(settings, plan=replace(settings.plan, sample_rate=50.0)), 5, 20261123)

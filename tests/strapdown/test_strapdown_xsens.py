@@ -59,6 +59,7 @@ def of_poses():
     return ic.calibrate(raw, FOLDER / "xsens.toml")
 
 
+@pytest.mark.campaign
 def test_biases_that_turn_the_unit_around_in_a_rest_are_begun_with():
     """Of 4 deg/s: without them the first rest of 52 s would be two turns by 100 deg."""
     without = calibrated(recording(), "k2", "size", "delay")
@@ -71,7 +72,11 @@ def test_biases_that_turn_the_unit_around_in_a_rest_are_begun_with():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("terms", "expected"),
-    [((), 9013.0), (("size", "delay"), 7667.0), (("size", "delay", "g_sensitivity"), 1930.0)],
+    [
+        pytest.param((), 9013.0, marks=pytest.mark.campaign),
+        pytest.param(("size", "delay"), 7667.0, marks=pytest.mark.campaign),
+        (("size", "delay", "g_sensitivity"), 1930.0),
+    ],
 )
 def test_chi_square_falls_as_in_another_program(terms, expected):
     """White noise alone; 2.8 mm/s at rest, of which that program's settings do not tell, puts all three within 5 %."""

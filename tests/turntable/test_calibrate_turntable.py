@@ -446,7 +446,7 @@ def test_accelerometers_whose_noise_is_not_stated_are_known_as_well_as_those_who
     )
     unstated = replace(settings, instrument=replace(settings.instrument, noise=None))
     rng = np.random.default_rng(20261121)
-    for _ in range(6):
+    for _ in range(3):
         record = simulate(settings, rng)
         known, found = (calibrate(record, each).estimate for each in (settings, unstated))
         assert found.status is Status.OK

@@ -97,7 +97,11 @@ def test_a_sound_calibration(plan):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "unit", "noise"),
-    [("accelerometer", "mg", 1e-4), ("gyro", "deg/h", 1e-7), ("gyro", "count", 1.0)],
+    [
+        pytest.param("accelerometer", "mg", 1e-4, marks=pytest.mark.campaign),
+        pytest.param("gyro", "deg/h", 1e-7, marks=pytest.mark.campaign),
+        ("gyro", "count", 1.0),
+    ],
 )
 def test_every_kind_of_instrument(kind, unit, noise):
     gain = {f"S_{axis}": 1e6 for axis in "xyz"} if unit == "count" else {}
