@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from sting_study import DEG, SCENARIOS, G, scenario
 
 from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.motion import course, duration
+from inercal.aoa.motion import buffet, course, duration
 from inercal.aoa.reading.from_record import recording_of
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import simulate, to_record
@@ -54,6 +56,25 @@ def test_read_again_with_its_study_it_is_the_same(name, raw):
     )
     assert ("temperature" in units) == raw
     same(recording_of(record, settings), made)
+
+
+@given(
+    n=st.integers(1, 400),
+    begin=st.floats(-50.0, 50.0),
+    step=st.floats(1e-4, 0.1),
+    seed=st.integers(0, 99),
+    uneven=st.booleans(),
+)
+def test_a_buffet_is_the_sum_of_its_sines_at_even_and_other_times(n, begin, step, seed, uneven):
+    """With rate and acceleration, of 0.1 to 40 Hz within 60 s, whatever is computed from what."""
+    rng = np.random.default_rng(seed)
+    of, t = buffet(1.0, 0.1, 40.0, rng, 20), begin + step * np.arange(n)
+    if uneven:
+        t = t + 0.3 * step * rng.random(n)
+    sines = np.exp(1j * (np.outer(t, of.omega) + of.phase)) * of.amplitude
+    expected = (sines.imag.sum(1), (of.omega * sines).real.sum(1), -(of.omega**2 * sines).imag.sum(1))
+    for k, (found, wanted) in enumerate(zip(of(t), expected, strict=True)):
+        assert_allclose(found, wanted, rtol=0.0, atol=1e-10 * np.max(of.omega) ** k)
 
 
 def test_volts_by_hand():
