@@ -38,6 +38,7 @@ test: .venv/dev/installed
 # The full numbers of runs, of which `make test` has short versions.
 campaign: .venv/dev/installed
 	$(DEV)/python -m pytest -n 2 --dist worksteal -m campaign
+	$(DEV)/python -m pytest -n 2 --dist worksteal -m "hypothesis and not campaign" --hypothesis-profile thorough
 
 # Compiled lines cannot be counted: short tests of kernels run once more with kernels as plain Python.
 coverage: .venv/dev/installed

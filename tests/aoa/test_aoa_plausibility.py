@@ -113,7 +113,9 @@ def test_gross_faults_are_named(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("motion", ["pitch-pause", "flexure", "buffet"])
+@pytest.mark.parametrize(
+    "motion", [pytest.param("pitch-pause", marks=pytest.mark.campaign), "flexure", "buffet"]
+)
 def test_gross_faults_in_other_motions(motion):
     settings = scenario(motion, duration=2.5)
     recording = recorded(settings, 3)
@@ -199,7 +201,7 @@ def test_two_faults_at_once():
     assert any("gyro looks reversed" in text for _, text in found)
 
 
-@pytest.mark.parametrize("delay", [2e-3, -4e-3, 20e-3])
+@pytest.mark.parametrize("delay", [pytest.param(2e-3, marks=pytest.mark.campaign), -4e-3, 20e-3])
 def test_a_gyro_that_is_late(delay):
     late = Disturbances(gyro_delay=delay)
     settings = study(motion=replace(BASE, duration=12.0), disturbances=late, timing=Timing(0.0))

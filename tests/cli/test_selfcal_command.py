@@ -233,7 +233,7 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     assert err.count("excess_scatter: NIS is ") == 1
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @POSIX
 def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
     """Killed without warning, while it works: each row is answered, and always with the same digits."""

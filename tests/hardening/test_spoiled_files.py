@@ -13,7 +13,7 @@ from spoiled import strict, whole
 
 from inercal.records.read import limits
 
-CASES, SHORT = 200, 40
+CASES, SHORT = 200, 20
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="many children, which are forks")
 

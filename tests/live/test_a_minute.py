@@ -31,10 +31,10 @@ def _newest(running):
 @pytest.mark.parametrize(
     "seconds",
     [
-        pytest.param(20, marks=pytest.mark.slow),
-        *(pytest.param(each, marks=pytest.mark.campaign) for each in (60, 600)),
+        pytest.param(6, marks=pytest.mark.slow),
+        *(pytest.param(each, marks=pytest.mark.campaign) for each in (20, 60, 600)),
     ],
-    ids=["twenty seconds", "minute", "ten minutes"],
+    ids=["six seconds", "twenty seconds", "minute", "ten minutes"],
 )
 def test_every_row_is_used_or_counted(seconds, study, tmp_path, broker, monkeypatch, record_property):
     monkeypatch.setattr(measurement, "KEPT", 300)
@@ -100,8 +100,9 @@ def test_every_row_is_used_or_counted(seconds, study, tmp_path, broker, monkeypa
             assert counts.lost == 0
     print(f"the sender was {behind:.3f} s behind at most; memory {early:.1f} MiB, then {late:.1f} MiB")
     print(f"{more} more objects")
-    assert more < 500 * seconds  # an object for each row of one wire would be 667
-    # 150 bytes for each row of all wires, and what waits on a busy machine
-    assert late - early < 12.0 + 0.2 * seconds
+    if seconds >= 20:  # in less, what begins with the wires outweighs what a leak would leave
+        assert more < 500 * seconds  # an object for each row of one wire would be 667
+        # 150 bytes for each row of all wires, and what waits on a busy machine
+        assert late - early < 12.0 + 0.2 * seconds
     cable.close()
     listening.close()

@@ -179,6 +179,7 @@ def dropped(page, files):
     page.dispatch_event("body", "drop", {"dataTransfer": transfer})
 
 
+@pytest.mark.campaign
 def test_files_dropped_together_are_one_recording_and_a_wrong_one_does_not_stop_the_others(tab, bench):
     page, watched = tab
     heard = []
@@ -282,6 +283,7 @@ def test_a_run_is_cancelled(tab, bench):
     watched.sound()
 
 
+@pytest.mark.campaign
 def test_after_kill_9_a_run_is_found_interrupted_and_is_started_again(window, tmp_path):
     killed = Served(tmp_path / "work")
     _, session = killed.ask("/api/v1/sessions", {"example": "ferraris-si"})
