@@ -78,8 +78,8 @@ def graph() -> tuple[dict[str, Path], dict[str, set[str]]]:
     """Files of the modules of the package, the benchmarks and the tests; and what each imports."""
     others = helpers()
     modules = SOURCES | others
-    trees = trees() | {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in others.items()}
-    return modules, {name: imported(tree, modules) - {name} for name, tree in trees.items()}
+    parsed = trees() | {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in others.items()}
+    return modules, {name: imported(tree, modules) - {name} for name, tree in parsed.items()}
 
 
 def distances(begin: set[str], uses: dict[str, set[str]]) -> dict[str, int]:
