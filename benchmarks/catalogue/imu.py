@@ -56,12 +56,7 @@ def ramp(size, which):
 
 def warming(size, which, over=30.0):
     """A bias that dies away over 30 s, as a unit warms up, less its mean, of accelerometers (0) or gyros (1)."""
-
-    def course(t):
-        left = np.exp(-t / over)
-        return left - left.mean()
-
-    return _added(size, which, course)
+    return _added(size, which, _dying(over))
 
 
 def _added(size, which, course):
@@ -76,9 +71,29 @@ def _added(size, which, course):
 
 def growing(size, which):
     """Scale factors that change evenly from begin to end, of accelerometers (0) or gyros (1)."""
+    return _scaled(size, which, lambda t: t / t[-1] - 0.5)
+
+
+def settling(size, which, over=30.0):
+    """Scale factors whose error dies away over 30 s, less its mean, of accelerometers (0) or gyros (1)."""
+    return _scaled(size, which, _dying(over))
+
+
+def _dying(over):
+    """A course (n,) of time that dies away, less its mean."""
+
+    def course(t):
+        left = np.exp(-t / over)
+        return left - left.mean()
+
+    return course
+
+
+def _scaled(size, which, course):
+    """Scale factors that take a course (n,) of time, its sign other on y."""
 
     def change(t, acc, gyro, rng):
-        factor = 1.0 + size * (t / t[-1] - 0.5)[:, None] * np.array([1.0, -1.0, 1.0])
+        factor = 1.0 + size * course(t)[:, None] * np.array([1.0, -1.0, 1.0])
         return (t, acc * factor, gyro) if which == 0 else (t, acc, gyro * factor)
 
     return change

@@ -73,7 +73,7 @@ def mutate(data: bytes, kind: str, seed: int) -> bytes:
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(change=mutation)
 def test_a_spoiled_recording_ends_with_a_verdict_or_one_line(folder, capsys, change):
     spoiled, out = folder / "spoiled.csv", folder / "cal.json"

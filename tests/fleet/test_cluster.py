@@ -195,7 +195,7 @@ def test_work_that_ends_every_worker_is_named(tmp_path):
     assert caught.value.chunk == range(0, 1)
 
 
-@pytest.mark.campaign
+@pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_the_command_which_goes_on_later(tmp_path, expected):
     kept = tmp_path / "kept"
     with cluster(tmp_path) as (file, processes, _):

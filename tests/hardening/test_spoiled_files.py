@@ -1,6 +1,6 @@
 """Files that are spoiled at random, their structure known: benchmarks/spoiled_files.py, 200 of each format.
 
-The test run reads 40 of each in a process of their own, `make campaign` the rest. A crash or a hang of it, an
+The test run reads 20 of each in a process of their own, `make campaign` the rest. A crash or a hang of it, an
 error that is not one sentence, and a value that differs from a strict parser's without a finding are faults of ours.
 """
 

@@ -170,7 +170,7 @@ def turns(rng, of=30):
 
 @pytest.mark.parametrize("draws", [300, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_turns_that_scatter_do_not_look_like_a_drift(draws):
-    """At 0.02 a share of 2 % is named: more than the limit is with a probability of 0.0013."""
+    """At 0.02 a share of 2 % is named: more than the limit is with 0.0013 at most."""
     rng = np.random.default_rng(20261127)
     through = np.linspace(-0.5, 0.5, 30)[:, None, None]
     found = 0
@@ -209,7 +209,7 @@ def test_turns_that_do_not_tell_a_drift_give_no_answer():
 @pytest.mark.parametrize("of", [9, 15])
 @pytest.mark.parametrize("draws", [300, pytest.param(1000, marks=pytest.mark.campaign)])
 def test_few_turns_beside_poses_that_fix_the_parameters_weakly_show_no_drift(of, draws):
-    """At 0.01 a share of 1 % is named, or less: more than the limit is with a probability of 0.003."""
+    """At 0.01 a share of 1 % is named, or less: more than the limit is with 0.003 at most."""
     rng = np.random.default_rng([20261130, of])
     found = 0
     for _ in range(draws):

@@ -149,10 +149,11 @@ before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 for path in sys.argv[1:]:
     begun = time.process_time()
     try:
-        read(path)
+        said = str(read(path))
     except InputError as error:
-        used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-        print(json.dumps([str(error), time.process_time() - begun, used / 1024]))
+        said = str(error)
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    print(json.dumps([said, time.process_time() - begun, used / 1024]))
 """
 
 

@@ -18,19 +18,20 @@ def result_of(name, seed=0):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("runs", [2, pytest.param(6, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("name", ["none", pytest.param("no walk, stated as 0", marks=pytest.mark.campaign)])
-def test_a_sound_record_of_another_simulator_is_ok_and_met(name):
+def test_a_sound_record_of_another_simulator_is_ok_and_met(name, runs):
     """With walks that the study leaves to the recording u is rather too large, for no record excludes small ones: the
     squared error may be half of what chance leaves."""
-    runs = [result_of(name, seed) for seed in range(2)]
-    for estimate, _ in runs:
+    found = [result_of(name, seed) for seed in range(runs)]
+    for estimate, _ in found:
         assert estimate.status is Status.OK
         assert {each.code for each in estimate.findings} <= {"at_prior", "stated_exact", "considered"}
-    z = np.array([list(errors.values()) for _, errors in runs])
+    z = np.array([list(errors.values()) for _, errors in found])
     # coefficients of a run are correlated: their covariance tells the size of all together
     assert np.abs(z).max() < 4.5
     squares = []
-    for estimate, errors in runs:
+    for estimate, errors in found:
         off = np.array([errors[name] * estimate[name].u for name in estimate.names])
         squares.append(off @ np.linalg.solve(estimate.covariance, off))
     low, high = chi2.ppf([5e-4, 1.0 - 5e-4], z.size)

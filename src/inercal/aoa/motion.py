@@ -42,11 +42,14 @@ class Sines:
         """
         n = len(t)
         step = (t[-1] - t[0]) / (n - 1) if n > _BLOCK else 0.0
-        if n > _BLOCK and np.ptp(np.diff(t)) < 1e-9 * step:
+        if n > _BLOCK and np.ptp(np.diff(t)) < 1e-9 * step + 4.0 * np.spacing(np.abs(t).max()):
             begin = self.amplitude * np.exp(1j * (np.multiply.outer(t[::_BLOCK], self.omega) + self.phase))
             since = np.exp(1j * np.multiply.outer(self.omega, step * np.arange(_BLOCK)))
-            z = [(begin * self.omega**k @ since).ravel()[:n] for k in range(3)]
-            return z[0].imag, z[1].real, -z[2].imag
+            value = (begin @ since).imag.ravel()[:n]
+            begin *= self.omega
+            rate = (begin @ since).real.ravel()[:n]
+            begin *= -self.omega
+            return value, rate, (begin @ since).imag.ravel()[:n]
         value, rate, acceleration = np.zeros((3, n))
         for a, om, phase in zip(self.amplitude, self.omega, self.phase, strict=True):
             s, c = a * np.sin(om * t + phase), a * om * np.cos(om * t + phase)

@@ -140,7 +140,7 @@ def _client(cluster: Cluster) -> Iterator[Any]:
         made = distributed.LocalCluster(
             n_workers=cluster.workers or os.cpu_count() or 1,
             threads_per_worker=1,
-            # Its server of pages would take port 8787 on every network, or warn that another has it.
+            # Its server of pages would take port 8787, or warn that another has it.
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             silence_logs=50,
         )

@@ -52,9 +52,7 @@ def _drift_shown(
     lasts = float(np.ptp(times))
     if lasts <= 0.0:
         return None
-    part = (times - np.min(times)) / lasts
-    courses = [part, *(-np.exp(-rate * part) / -np.expm1(-rate) for rate in _SETTLING)]
-    best = None
+    courses, best = _courses((times - np.min(times)) / lasts), None
     for course in courses:
         through = course - np.mean(course)
         in_force = -inverses(acc.model, acc.k2, acc.f) * (through[:, None] * in_output)[:, None, :]
@@ -63,6 +61,11 @@ def _drift_shown(
         if found is not None and (best is None or found.probability < best.shown.probability):
             best = Tested(of, found, LIMITS.driver_probability, len(courses))
     return None if best is None or best.shown.probability > best.limit else best
+
+
+def _courses(part: Array) -> list[Array]:
+    """What grows by 1 over the recording, of which the ``part`` (n,) has gone: evenly, or as a unit settles."""
+    return [part, *(-np.exp(-rate * part) / -np.expm1(-rate) for rate in _SETTLING)]
 
 
 def bias_drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertainty) -> Finding:
@@ -80,16 +83,17 @@ def bias_drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Unce
 def gyro_scale_drift(
     gyro: GyroFit, times: Array, names: tuple[str, ...], uncertainty: Uncertainty
 ) -> Iterator[Finding]:
-    """A finding where the turns show that the gyro's scale factors change evenly with ``times`` (n,) [s] of the poses;
-    harm to the coefficients ``names`` as with biases.
+    """A finding where the turns show that the gyro's scale factors change over the ``times`` (n,) [s] of the poses, in
+    one of the courses of biases; harm to the coefficients ``names`` as with them.
 
     Accelerometers that drift make verticals wrong, and so the turns: where they are found to, this is not asked.
     """
     at = 0.5 * (times[gyro.first] + times[gyro.first + 1])
-    through = (at - np.mean(at)) / np.ptp(times)
-    columns = gyro.linear.jacobian[:, :, _SCALES] * gyro.model.scale * through[:, None, None]
-    found = gyro.linear.added(columns)
-    if found is None or not found.probability <= LIMITS.driver_probability:
+    scales = gyro.linear.jacobian[:, :, _SCALES] * gyro.model.scale
+    courses = _courses((at - np.min(times)) / np.ptp(times))
+    tried = [gyro.linear.added(scales * (course - np.mean(course))[:, None, None]) for course in courses]
+    found = min((each for each in tried if each is not None), key=lambda each: each.probability, default=None)
+    if found is None or not len(courses) * found.probability <= LIMITS.driver_probability:
         return
     # beyond the names follow the unknown parts of earth rate
     shifts = dict(zip(gyro.names, found.shifts @ found.estimate, strict=False))
