@@ -117,6 +117,16 @@ def test_scale_factors_that_drift_are_named_with_their_size_and_end_the_verdict(
             assert abs(value - each) < 4.5 * u + 1e-6
 
 
+def test_scale_factors_of_a_gyro_that_settle_are_named():
+    """By 1 % within 30 s of the 150 s: by the drift or, where it bends the first turns alone, by one of these."""
+    for draw in range(3):
+        done = drifting(draw, 0.0, change=catalogue.settling(1e-2, 1))
+        (found,) = [*said(done, "trend"), *said(done, "outlying_turn")]
+        assert "the scale factors of the gyro change" in found.message or found.code == "outlying_turn"
+        assert found.harm
+        assert done.estimate.status is Status.SUSPECT
+
+
 def test_a_sound_unit_has_none():
     done = drifting(1, 0.0)
     assert said(done) == said(done, "trend") == []

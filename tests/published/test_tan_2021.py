@@ -407,7 +407,7 @@ class TestWhoWins:
         assert rms(found[np.isfinite(found)]) / DEG == pytest.approx(0.006, abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_pictures_are_drawn(tmp_path):
     folder = Path(__file__).parents[2] / "docs" / "pictures"
     subprocess.run([sys.executable, str(folder / "tan_2021.py"), str(tmp_path)], check=True, timeout=60)

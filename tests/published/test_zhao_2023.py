@@ -423,7 +423,7 @@ def test_on_az_no_limit_below_an_eighth_leaves_a_position(indices):
     assert inner[:2].max() < 0.25 + 1e-5
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_pictures_are_drawn(tmp_path):
     folder = Path(__file__).parents[2] / "docs" / "pictures"
     subprocess.run([sys.executable, str(folder / "zhao_2023.py"), str(tmp_path)], check=True, timeout=60)
