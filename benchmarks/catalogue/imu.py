@@ -175,7 +175,9 @@ def faults() -> dict[str, Fault]:
     for name in found:
         if name.startswith("clock"):
             found[name] = replace(found[name], told="clock|sample rate|time stamps", blind=CLOCK)
-    found |= {name: Fault(partial(by_file, change)) for name, change in OF_FILES.items()}
+    for name, change in OF_FILES.items():
+        told = "the scale factors of the gyro change" if name.startswith("scales of gyros") else ""
+        found[name] = Fault(partial(by_file, change), told)
     for ppm in (50, 1000):
         site = replace(imu_faults.SITE, gravity=imu.G * (1.0 + 1e-6 * ppm))
         wrong = partial(by_file, lambda t, acc, gyro, rng: (t, acc, gyro), settings=ImuSettings(site))

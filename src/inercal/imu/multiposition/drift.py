@@ -93,7 +93,7 @@ def gyro_scale_drift(
     courses = _courses((at - np.min(times)) / np.ptp(times))
     tried = [gyro.linear.added(scales * (course - np.mean(course))[:, None, None]) for course in courses]
     found = min((each for each in tried if each is not None), key=lambda each: each.probability, default=None)
-    if found is None or not len(courses) * found.probability <= LIMITS.driver_probability:
+    if found is None or not len(courses) * found.probability <= LIMITS.gyro_drift_probability:
         return
     # beyond the names follow the unknown parts of earth rate
     shifts = dict(zip(gyro.names, found.shifts @ found.estimate, strict=False))
