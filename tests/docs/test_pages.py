@@ -22,7 +22,6 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 #: pages whose commands take more than two seconds
 SLOW = [
     "README.md",
-    "docs/how-to/calibrate-a-platform.md",
     "docs/how-to/calibrate-an-imu.md",
     "docs/how-to/calibrate-a-strapdown-unit.md",
     "docs/how-to/calibrate-on-a-turntable.md",
@@ -48,8 +47,14 @@ SLOW = [
     "docs/tutorials/turntable.md",
     "docs/tutorials/your-own-platform.md",
 ]
-#: pages that take ten seconds or more; what they run is in other tests too
-LONG = ["docs/how-to/design-a-path.md", "docs/how-to/poses-or-turns.md", "docs/how-to/validate.md"]
+#: pages that take some ten seconds or more; what they run is in other tests too
+LONG = [
+    "docs/how-to/calibrate-a-platform.md",
+    "docs/how-to/design-a-path.md",
+    "docs/how-to/measure-angle-of-attack.md",
+    "docs/how-to/poses-or-turns.md",
+    "docs/how-to/validate.md",
+]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 EXIT = re.compile(r"\[exit (\d+)\]")

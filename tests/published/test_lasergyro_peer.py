@@ -51,7 +51,7 @@ def test_its_rule_gives_its_values_and_misses_the_curve():
     assert np.all(tau[ratio[:, :3].argmin(axis=0)] < 0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_on_noise_of_the_five_kinds():
     """A hundred recordings with known N, B and K: the rule finds R and Q where there are none."""
     truth = NoiseModel(N=1e-4, B=2e-4, K=2e-4)

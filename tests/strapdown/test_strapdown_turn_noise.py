@@ -167,6 +167,7 @@ def test_of_few_rests_turns_tell_what_poses_do_not():
         assert ("or take `inercal calibrate strapdown`" in found.message) is advised
 
 
+@pytest.mark.campaign
 def test_lost_samples_shift_nothing_beyond_u():
     _, errors = named("5 samples lost in a turn")
     assert max(map(abs, errors.values())) < 4.5

@@ -112,8 +112,8 @@ class Limits:
     not put down to chance."""
 
     gyro_drift_probability: float = 1e-2
-    """The same of a drift of the gyro's scale factors: turns are few, and what they show less clearly shifts values too.
-    A sound recording is named once in a hundred, and stays ok where nothing is shifted by more than its u."""
+    """The same of a drift of the gyro's scale factors: turns are few, and what they show less clearly shifts values,
+    too. A sound recording is named once in a hundred, and stays ok where nothing is shifted by more than its u."""
 
     # rows of means, known rates and turns
 

@@ -64,7 +64,7 @@ def _drift_shown(
 
 
 def _courses(part: Array) -> list[Array]:
-    """What grows by 1 over the recording, of which the ``part`` (n,) has gone: evenly, or as a unit settles."""
+    """Courses that grow by 1 over the recording, of which the ``part`` (n,) has gone: evenly, or as a unit settles."""
     return [part, *(-np.exp(-rate * part) / -np.expm1(-rate) for rate in _SETTLING)]
 
 
