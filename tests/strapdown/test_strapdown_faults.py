@@ -39,10 +39,10 @@ def test_a_sound_record_of_another_simulator_is_ok_and_met(name, runs):
 
 
 def named(name, words):
-    """Assert that the effect of a case is the one that is named, and that it does harm."""
+    """Assert that the effect of a case is the one that is named first, and that it does harm."""
     estimate, _ = result_of(name)
     assert estimate.status in (Status.SUSPECT, Status.INCONSISTENT)
-    (finding,) = (
+    finding = next(
         each for each in estimate.findings if each.code in ("unmodelled", "bias_drift", "site_suspect")
     )
     assert words in finding.message
