@@ -56,6 +56,12 @@ def trees():
     return {module: ast.parse(path.read_text(encoding="utf-8")) for module, path in SOURCES.items()}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def parsed():
+    """Parse before the first test, which is not charged with it."""
+    trees()
+
+
 def for_type_checking(node):
     """True for ``if TYPE_CHECKING:``."""
     return isinstance(node, ast.If) and ast.unparse(node.test).removeprefix("typing.") == "TYPE_CHECKING"
