@@ -18,7 +18,7 @@ import sys
 from collections import deque
 from pathlib import Path
 
-from test_architecture import PACKAGE, SOURCES, trees
+from test_architecture import PACKAGE, SOURCES, TREES
 
 ROOT = Path(__file__).parents[1]
 SECONDS = 35.0
@@ -78,7 +78,7 @@ def graph() -> tuple[dict[str, Path], dict[str, set[str]]]:
     """Files of the modules of the package, the benchmarks and the tests; and what each imports."""
     others = helpers()
     modules = SOURCES | others
-    parsed = trees() | {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in others.items()}
+    parsed = TREES | {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in others.items()}
     return modules, {name: imported(tree, modules) - {name} for name, tree in parsed.items()}
 
 

@@ -49,17 +49,7 @@ SOURCES = {
     for path in sorted(PACKAGE.rglob("*.py"))
 }
 
-
-@functools.cache
-def trees():
-    """All modules parsed, when the first test asks: every worker imports this file."""
-    return {module: ast.parse(path.read_text(encoding="utf-8")) for module, path in SOURCES.items()}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def parsed():
-    """Parse before the first test, which is not charged with it."""
-    trees()
+TREES = {module: ast.parse(path.read_text(encoding="utf-8")) for module, path in SOURCES.items()}
 
 
 def for_type_checking(node):
@@ -85,7 +75,7 @@ def imports(module, functions=True):
 
 
 def read_imports(module, functions):
-    for node in walk(trees()[module], functions):
+    for node in walk(TREES[module], functions):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -186,7 +176,7 @@ WITHIN = {
 
 def all_imports(module):
     """Modules of the package that a module names in any import, for type checking and inside functions too."""
-    for node in ast.walk(trees()[module]):
+    for node in ast.walk(TREES[module]):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in SOURCES)
         elif isinstance(node, ast.ImportFrom):
@@ -213,7 +203,7 @@ def test_no_package_has_a_module_of_the_name_of_what_it_defines():
         }
         named = [
             {node.name} if isinstance(node, ast.FunctionDef | ast.ClassDef) else set(names_defined(node))
-            for node in trees()[package].body
+            for node in TREES[package].body
         ]
         own = set().union(*named, inercal.__all__ if package == "inercal" else ())
         taken += [f"{package}.{name}" for name in own & inside]
@@ -274,14 +264,14 @@ def test_what_is_public_is_explained():
                 if public and not child.name.startswith("_"):
                     yield from undocumented(child, f"{name}.{child.name}")
 
-    assert [name for module in MODULES for name in undocumented(trees()[module], module)] == []
+    assert [name for module in MODULES for name in undocumented(TREES[module], module)] == []
 
 
 def test_docstrings_begin_with_their_subject():
     """A noun or a verb: no docstring, of a constant neither, opens with a question."""
     questions = [
         f"{module}, line {node.lineno}"
-        for module, tree in trees().items()
+        for module, tree in TREES.items()
         for node in ast.walk(tree)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         if re.match(r"\s*(What|How|Whether|Where)\b", str(node.value.value))
@@ -301,7 +291,7 @@ def names_in(tree):
 
 def test_what_is_defined_is_used():
     """By the program, its pages, the book or the benchmarks: what tests alone call belongs to the tests."""
-    used = {name for tree in trees().values() for name in names_in(tree)}
+    used = {name for tree in TREES.values() for name in names_in(tree)}
     for page in PACKAGE.rglob("*.html"):
         used |= set(re.findall(r"\w+", page.read_text(encoding="utf-8")))
     for folder in ("benchmarks", "docs"):
@@ -312,7 +302,7 @@ def test_what_is_defined_is_used():
             used |= set(names_in(ast.parse(block)))
     unused = [
         f"{module}.{node.name}"
-        for module, tree in trees().items()
+        for module, tree in TREES.items()
         for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef | ast.ClassDef)
         and node.name not in used
@@ -330,7 +320,7 @@ def test_the_map_names_every_room():
 
 def test_what_is_referred_to_is_there():
     """`inercal.room.module.name` in a docstring, a comment or the book: moved code must not leave a dead reference."""
-    defined = {module: set(names_defined(tree)) for module, tree in trees().items()}
+    defined = {module: set(names_defined(tree)) for module, tree in TREES.items()}
 
     def is_there(reference):
         parts = reference.split(".")
@@ -376,7 +366,7 @@ def prints(node):
 
 
 def test_only_the_command_line_prints():
-    modules = {module for module in MODULES if any(prints(node) for node in ast.walk(trees()[module]))}
+    modules = {module for module in MODULES if any(prints(node) for node in ast.walk(TREES[module]))}
     assert {module for module in modules if room(module) != "cli"} == set()
 
 
@@ -389,7 +379,7 @@ def test_randomness_is_always_handed_in():
     """No global generator, and none made without a seed."""
     allowed = {"Generator", "default_rng", "SeedSequence", "PCG64", "BitGenerator"}
     for module in MODULES:
-        for node in ast.walk(trees()[module]):
+        for node in ast.walk(TREES[module]):
             match node:
                 case ast.Attribute(value=ast.Attribute(value=ast.Name(id="np" | "numpy"), attr="random")):
                     assert node.attr in allowed, f"{module} uses np.random.{node.attr}"
@@ -417,12 +407,12 @@ try:
 except ImportError:
     import six
 """
-    trees()["sample"] = ast.parse(code)
+    TREES["sample"] = ast.parse(code)
     try:
         assert imports("sample") == {"typing", "two", "three", "four", "five", "six"}
         assert imports("sample", functions=False) == {"typing", "two", "four", "five", "six"}
     finally:
-        del trees()["sample"]
+        del TREES["sample"]
     assert len(MODULES) > 40
     assert floor("inercal.imu.multiposition.figures") > floor("inercal.imu.task")
     assert room("inercal.records.read.text") == "records"
