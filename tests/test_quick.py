@@ -4,6 +4,8 @@ import pytest
 
 import quick
 
+pytestmark = pytest.mark.slow  # the first reads all imports
+
 
 def order(*files):
     return quick.selected(list(files))
