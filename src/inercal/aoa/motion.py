@@ -38,7 +38,7 @@ class Sines:
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
         """Value, rate and acceleration at times (n,) [s].
 
-        Of even times one in so many is computed, the others from it by products of exponentials, ten times faster.
+        Of even times one in so many is computed, the others from it by products of exponentials.
         """
         n = len(t)
         step = (t[-1] - t[0]) / (n - 1) if n > _BLOCK else 0.0
