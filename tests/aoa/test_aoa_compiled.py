@@ -64,7 +64,6 @@ def compiled():
     return ran()
 
 
-@pytest.mark.slow
 def test_a_second_process_compiles_nothing(compiled):
     """A kernel that depends on anything of its process would be compiled in each; one type is enough for all."""
     again = ran()

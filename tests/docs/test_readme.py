@@ -1,4 +1,7 @@
-"""Every command of the README runs as written, on recordings such as a user has: its own, and those that ship."""
+"""Every command of the README runs as written, on recordings such as a user has: its own, and those that ship.
+
+Only the thousand runs of a campaign are a hundred here.
+"""
 
 import gzip
 import io

@@ -113,7 +113,7 @@ print("same")
     assert python(program, NUMBA_DISABLE_JIT=1) == "same"
 
 
-@pytest.mark.campaign
+@pytest.mark.slow
 def test_a_second_process_compiles_none_of_the_passes():
     """A pass that depends on anything of its process would be compiled in each."""
     program = """
