@@ -58,6 +58,11 @@ class Recording:
     warm: Array | None = None
     fixed: tuple[int, ...] = ()
 
+    def __post_init__(self) -> None:
+        # For arrays that lie otherwise in memory, all kernels would be compiled once more.
+        for name in ("rate", "th", "acc"):
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
+
     @property
     def dt(self) -> Array:
         """(n - 1,) s, from each row to the next."""
