@@ -55,6 +55,7 @@ CASES = {
         f"accelerometers drift by {1e6 * size:g} ug": ({"ramp_acc": size * 9.8}, {}, {})
         for size in (5e-5, 5e-4)
     },
+    "both drift, by 10 deg/h and 500 ug": ({"ramp_gyro": 10.0 * DPH, "ramp_acc": 5e-4 * 9.8}, {}, {}),
     **{f"biases of {sensor} walk": (walk, {}, {}) for sensor, walk in WALKS.items()},
     **{f"biases of {sensor} walk, stated as 0": (walk, {}, STILL) for sensor, walk in WALKS.items()},
     "no walk, stated as 0": ({}, {}, STILL),

@@ -41,13 +41,15 @@ class Candidate(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """A candidate, by how much chi-square falls when it is freed, and the ``limit`` beyond which that is more than
-    chance; by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the
-    coefficients of the fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q),
-    that of the prior with it."""
+    """A candidate, by how much chi-square falls when it is freed (``drop``) and of that what it alone explains
+    (``own``), where the strongest of its code is free already, and the ``limit`` beyond which that is more than chance;
+    by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the coefficients of the
+    fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q), that of the prior with
+    it."""
 
     candidate: Candidate
     drop: float
+    own: float
     limit: float
     moved: Array
     score: Array
@@ -125,17 +127,30 @@ def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
     size = np.concatenate([fit.prior, prior])
     upper = np.triu(H[2 * m + 3 :, 2 * m + 3 :])
     scaled, right = (upper + np.triu(upper, 1).T) * np.outer(size, size), g[2 * m + 3 :] * size
-    done, begin = [], p
-    for each in tried:
-        q = np.arange(begin, begin + len(each.prior))
-        begin += len(q)
-        by = np.linalg.solve(scaled[:p, :p], scaled[:p, q])
-        score = right[q] - by.T @ right[:p]
-        left = scaled[np.ix_(q, q)] - scaled[q, :p] @ by
+    ends = p + np.cumsum([len(each.prior) for each in tried])
+    done: list[tuple[Tested, Array]] = []
+    for each, end in zip(tried, ends.tolist(), strict=True):
+        q = np.arange(end - len(each.prior), end)
+        by, score, left = _freed(scaled, right, p, q)
         if not np.all(np.linalg.eigvalsh(left) > 0.0):  # lost in rounding
             continue
         drop = float(score @ np.linalg.solve(left, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(tried)))
-        moved = -fit.prior[:, None] * by
-        done.append(Tested(each, drop, limit, moved, score, left))
-    return sorted(done, key=lambda each: -each.drop)
+        done.append((Tested(each, drop, drop, limit, -fit.prior[:, None] * by, score, left), q))
+    done.sort(key=lambda each: -each[0].drop)
+    strongest: dict[str, tuple[Tested, Array]] = {}
+    found = []
+    for one, q in done:
+        first, places = strongest.setdefault(one.candidate.code, (one, q))
+        if first is not one:
+            _, score, left = _freed(scaled, right, p, np.concatenate([places, q]))
+            one = one._replace(own=float(score @ np.linalg.solve(left, score)) - first.drop)
+        found.append(one)
+    return found
+
+
+def _freed(H: Array, g: Array, p: int, q: Array) -> tuple[Array, Array, Array]:
+    """Parameters ``q`` freed beside the first p, by normal equations H x = g: how these follow (p, q), and score (q,)
+    and information (q, q) of the parameters when these have followed."""
+    by = np.asarray(np.linalg.solve(H[:p, :p], H[:p, q]), dtype=float)
+    return by, g[q] - by.T @ g[:p], H[np.ix_(q, q)] - H[q, :p] @ by

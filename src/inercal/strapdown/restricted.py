@@ -207,7 +207,7 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
         tested, drifting = tests(shown.fit, shown.settings), found.noise.walks
         if not _by_others(shown.fit, tested, found.gain, drifting):
             ramps = tuple(
-                each for each in tested if drifting and each.significant and each.candidate.code == DRIFT
+                each for each in tested if drifting and each.own > each.limit and each.candidate.code == DRIFT
             )
             noise = replace(found.noise, estimate=names)
             shown = Shown(replace(settings, noise=noise), found.fit, ramps)
