@@ -26,6 +26,7 @@ myst_heading_anchors = 3
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_use_type_comments = False  # there are none; to look for them, every module is parsed
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike")}
 python_use_unqualified_type_names = True
 napoleon_google_docstring = False

@@ -95,7 +95,9 @@ def test_vibration_as_small_as_is_usual_makes_no_offset_to_speak_of():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["sine", pytest.param("polar", marks=pytest.mark.campaign), "rest"])
+@pytest.mark.parametrize(
+    "kind", [*(pytest.param(each, marks=pytest.mark.campaign) for each in ("sine", "polar")), "rest"]
+)
 def test_in_a_buffet_the_snap_is_that_of_the_data(kind):
     """5 to 40 Hz, 0.05 to 0.3 deg rms: with the usual snap 3.5 u to 3900 u off; of ten draws, 1.4 u."""
     ratios = []
@@ -234,8 +236,18 @@ def test_a_reference_that_is_late_is_said():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("smoothed", [False, True])
-@pytest.mark.parametrize("kind", ["sine", "polar", "rest"])
+@pytest.mark.parametrize(
+    ("kind", "smoothed"),
+    [
+        ("sine", True),
+        ("polar", False),
+        ("rest", True),
+        *(
+            pytest.param(*each, marks=pytest.mark.campaign)
+            for each in (("sine", False), ("polar", True), ("rest", False))
+        ),
+    ],
+)
 def test_in_vibration_the_angle_is_good_and_u_is_its_size(kind, smoothed):
     """Without a band 0.3 to 70 deg off, 24 to 210 u."""
     ratios = []

@@ -250,8 +250,17 @@ def test_files_with_distinct_channels_are_one_record(capsys):
 # Live.
 
 
-@pytest.mark.parametrize("low_pass", ["none", "50 Hz"])
-@pytest.mark.parametrize("how", [[], ["--states", "8"], ["--set", "model.roll=5.0(2) deg"]])
+@pytest.mark.parametrize(
+    ("how", "low_pass"),
+    [
+        ([], "none"),
+        ([], "50 Hz"),
+        (["--states", "8"], "none"),
+        (["--states", "8"], "50 Hz"),
+        (["--set", "model.roll=5.0(2) deg"], "50 Hz"),
+        pytest.param(["--set", "model.roll=5.0(2) deg"], "none", marks=pytest.mark.campaign),
+    ],
+)
 def test_a_stream_gives_the_bytes_of_the_file(how, low_pass, capsys, monkeypatch):
     """Where the study states band and snap; with status and NIS beside."""
     how = [*how, "--set", f"band.low_pass={low_pass}", "--set", "estimator.snap=1e8 rad^2/s^7"]

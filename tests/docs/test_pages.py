@@ -23,9 +23,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SLOW = [
     "README.md",
     "docs/how-to/calibrate-an-imu.md",
-    "docs/how-to/calibrate-a-strapdown-unit.md",
     "docs/how-to/calibrate-on-a-turntable.md",
-    "docs/how-to/live.md",
     "docs/how-to/measure-by-wire.md",
     "docs/how-to/noise.md",
     "docs/how-to/on-a-table-with-known-angles.md",
@@ -45,15 +43,17 @@ SLOW = [
     "docs/tutorials/self-calibration.md",
     "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
-    "docs/tutorials/your-own-platform.md",
 ]
-#: pages that take some ten seconds or more; what they run is in other tests too
+#: X; what they run is in other tests too
 LONG = [
     "docs/how-to/calibrate-a-platform.md",
+    "docs/how-to/calibrate-a-strapdown-unit.md",
     "docs/how-to/design-a-path.md",
+    "docs/how-to/live.md",
     "docs/how-to/measure-angle-of-attack.md",
     "docs/how-to/poses-or-turns.md",
     "docs/how-to/validate.md",
+    "docs/tutorials/your-own-platform.md",
 ]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"
 FENCE = re.compile(r"^```(python|console|toml|csv)\n(.*?)^```", re.DOTALL | re.MULTILINE)

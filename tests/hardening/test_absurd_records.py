@@ -175,6 +175,7 @@ RARE = {
     "one of 1e160",
     "no stamps",
     "nanoseconds",
+    "1e-300 s",
     "1e300 s",
     "days",
     "doubling",

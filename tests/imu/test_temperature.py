@@ -60,7 +60,7 @@ def test_kelvin_and_celsius_are_one_temperature():
     np.testing.assert_allclose(a.values, b.values, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("wander", [0, 30, 300])
+@pytest.mark.parametrize("wander", [0, pytest.param(30, marks=pytest.mark.campaign), 300])
 def test_the_uncertainty_of_the_curve_holds_under_wandering_noise(wander):
     """300 sweeps with white noise and noise of a correlation of 0, 30 or 300 of 2000 samples. Stated intervals of 95 %
     cover the truth in 87 to 100 %: at least 0.95 less 4.5 standard deviations of the count (0.057) and less what a
@@ -98,7 +98,7 @@ def test_a_difference_between_branches_is_measured_and_said():
     assert abs(quiet["gyro_x_hyst"].value) < 5 * quiet["gyro_x_hyst"].u
 
 
-@pytest.mark.parametrize("wander", [0, 30, 300])
+@pytest.mark.parametrize("wander", [0, pytest.param(30, marks=pytest.mark.campaign), 300])
 def test_noise_alone_is_no_hysteresis(wander):
     """Flat outputs of six channels with white noise, or wander beside it: in 20 records a finding in one at most, where
     each may have one by chance at a risk of 1 % (two of 20 and more: 1.7 % of the time)."""

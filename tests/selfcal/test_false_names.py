@@ -42,7 +42,7 @@ def correlated(rng, shape, along, size):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arcseconds", [60.0, 600.0])
+@pytest.mark.parametrize("arcseconds", [60.0, pytest.param(600.0, marks=pytest.mark.campaign)])
 def test_noise_of_coarse_encoders_is_no_periodic_error(arcseconds):
     """At rest sin(k th) of the angles read varies with their noise alone. Of 8 recordings none has a finding, where
     with angles as read 13 of 16 had."""
@@ -150,7 +150,13 @@ def test_readings_that_freeze(sensors, words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("floor", "words"), [(2.0, "explain the innovations"), (5.0, "as with 1/f noise")])
+@pytest.mark.parametrize(
+    ("floor", "words"),
+    [
+        pytest.param(2.0, "explain the innovations", marks=pytest.mark.campaign),
+        (5.0, "as with 1/f noise"),
+    ],
+)
 def test_flicker_of_accelerometers_is_no_walk_of_the_gyros(floor, words):
     """Noise of both is no Markov process: the stronger it is, the less a bias that walks makes innovations white."""
     noisy = replace(STUDY, disturbances=Disturbances(flicker=floor * MICRO_G))

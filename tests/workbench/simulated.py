@@ -1,6 +1,7 @@
 """Pages without a browser: NiceGUI's own user, for what a page says and does."""
 
 import asyncio
+import gc
 import sys
 from functools import wraps
 
@@ -30,6 +31,7 @@ def of_user(test):
             finally:
                 bench.close()
 
+        gc.freeze()  # NiceGUI collects all garbage before and after each: of what these tests leave, not of all others
         ours = {name: module for name, module in sys.modules.items() if name.partition(".")[0] == "inercal"}
         try:
             asyncio.run(simulated())
