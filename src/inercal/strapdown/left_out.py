@@ -41,15 +41,13 @@ class Candidate(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """A candidate, by how much chi-square falls when it is freed (``drop``) and of that what it alone explains
-    (``own``), where the strongest of its code is free already, and the ``limit`` beyond which that is more than chance;
-    by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the coefficients of the
-    fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q), that of the prior with
-    it."""
+    """A candidate, by how much chi-square falls when it is freed, and the ``limit`` beyond which that is more than
+    chance; by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the
+    coefficients of the fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q),
+    that of the prior with it."""
 
     candidate: Candidate
     drop: float
-    own: float
     limit: float
     moved: Array
     score: Array
@@ -107,15 +105,43 @@ def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
             )
 
 
-def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
-    """Score tests of all that a fit may have left out, the largest fall of chi-square first."""
-    from scipy.special import chdtri
+class Posed(NamedTuple):
+    """Normal equations ``H`` (n, n), ``g`` (n,) of the p coefficients of a fit and, behind them, of the parameters of
+    ``candidates``, the nodes eliminated, all in units of their prior; the ``places`` of the parameters of each
+    candidate, and the ``prior`` (p,) standard deviations of the fit."""
 
+    candidates: list[Candidate]
+    places: list[Array]
+    H: Array
+    g: Array
+    prior: Array
+
+    def tested(self, number: int, beside: int | None = None) -> Tested | None:
+        """The score test of a candidate, with another one freed before it where ``beside`` is given; None where the
+        information was lost in rounding."""
+        from scipy.special import chdtri
+
+        p, q = len(self.prior), self.places[number]
+        free = np.arange(p) if beside is None else np.append(np.arange(p), self.places[beside])
+        by = np.asarray(np.linalg.solve(self.H[np.ix_(free, free)], self.H[np.ix_(free, q)]), dtype=float)
+        score = self.g[q] - by.T @ self.g[free]
+        information = self.H[np.ix_(q, q)] - self.H[np.ix_(q, free)] @ by
+        if not np.all(np.linalg.eigvalsh(information) > 0.0):
+            return None
+        drop = float(score @ np.linalg.solve(information, score))
+        limit = float(chdtri(len(q), LIMITS.naming_risk / len(self.candidates)))
+        moved = -self.prior[:, None] * by[:p]
+        return Tested(self.candidates[number], drop, limit, moved, score, information)
+
+
+def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
+    """The normal equations of a fit and of all that it may have left out."""
     tried = list(_candidates(fit, settings))
     m, p = fit.chain.F.shape[1], len(fit.free)
-    more = np.concatenate([each.columns for each in tried], axis=2)
+    none = np.empty((len(fit.chain.G), 6, 0))
+    more = np.concatenate([none, *(each.columns for each in tried)], axis=2)
     columns = np.pad(more, ((0, 0), (0, m - 6), (0, 0)))
-    prior = np.concatenate([each.prior for each in tried])
+    prior = np.concatenate([np.empty(0), *(each.prior for each in tried)])
     chain = fit.chain._replace(
         G=np.ascontiguousarray(np.concatenate([fit.chain.G, columns], axis=2)),
         prior=np.concatenate([fit.chain.prior, prior**-2]),
@@ -126,31 +152,40 @@ def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
     forward(chain, H, g, np.empty((count, m + 3, n)), np.empty((count, m + 3)))
     size = np.concatenate([fit.prior, prior])
     upper = np.triu(H[2 * m + 3 :, 2 * m + 3 :])
-    scaled, right = (upper + np.triu(upper, 1).T) * np.outer(size, size), g[2 * m + 3 :] * size
-    ends = p + np.cumsum([len(each.prior) for each in tried])
-    done: list[tuple[Tested, Array]] = []
-    for each, end in zip(tried, ends.tolist(), strict=True):
-        q = np.arange(end - len(each.prior), end)
-        by, score, left = _freed(scaled, right, p, q)
-        if not np.all(np.linalg.eigvalsh(left) > 0.0):  # lost in rounding
-            continue
-        drop = float(score @ np.linalg.solve(left, score))
-        limit = float(chdtri(len(q), LIMITS.naming_risk / len(tried)))
-        done.append((Tested(each, drop, drop, limit, -fit.prior[:, None] * by, score, left), q))
-    done.sort(key=lambda each: -each[0].drop)
-    strongest: dict[str, tuple[Tested, Array]] = {}
-    found = []
-    for one, q in done:
-        first, places = strongest.setdefault(one.candidate.code, (one, q))
-        if first is not one:
-            _, score, left = _freed(scaled, right, p, np.concatenate([places, q]))
-            one = one._replace(own=float(score @ np.linalg.solve(left, score)) - first.drop)
-        found.append(one)
-    return found
+    ends = np.cumsum([len(each.prior) for each in tried])
+    places = [
+        p + np.arange(end - len(each.prior), end) for each, end in zip(tried, ends.tolist(), strict=True)
+    ]
+    scaled = (upper + np.triu(upper, 1).T) * np.outer(size, size)
+    return Posed(tried, places, scaled, g[2 * m + 3 :] * size, fit.prior)
 
 
-def _freed(H: Array, g: Array, p: int, q: Array) -> tuple[Array, Array, Array]:
-    """Parameters ``q`` freed beside the first p, by normal equations H x = g: how these follow (p, q), and score (q,)
-    and information (q, q) of the parameters when these have followed."""
-    by = np.asarray(np.linalg.solve(H[:p, :p], H[:p, q]), dtype=float)
-    return by, g[q] - by.T @ g[:p], H[np.ix_(q, q)] - H[q, :p] @ by
+def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
+    """Score tests of all that a fit may have left out, the largest fall of chi-square first."""
+    problem = posed(fit, settings)
+    done = (problem.tested(number) for number in range(len(problem.candidates)))
+    return sorted((each for each in done if each), key=lambda each: -each.drop)
+
+
+def drifts(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
+    """Drifts of biases that a recording shows, the stronger first (`told_apart`)."""
+    problem = posed(fit, settings)
+    return told_apart(problem, [k for k, each in enumerate(problem.candidates) if each.code == DRIFT])
+
+
+def told_apart(problem: Posed, numbers: list[int]) -> list[Tested]:
+    """Of two effects that look alike in part those that a recording shows.
+
+    Where both together explain more than the stronger one by more than chance, both are shown, each tested beside the
+    other. Else the stronger one is, and the weaker one, where it explains as much but for chance, since none can say
+    which of them it is.
+    """
+    alone = [(number, each) for number in numbers if (each := problem.tested(number))]
+    alone.sort(key=lambda each: -each[1].drop)
+    if len(alone) == 2:
+        (first, stronger), (second, _) = alone
+        beside = problem.tested(first, second), problem.tested(second, first)
+        if all(each and each.significant for each in beside):
+            return [each for each in beside if each]
+        alone = [each for each in alone if each[1].drop >= stronger.drop - each[1].limit]
+    return [each for _, each in alone if each.significant]

@@ -30,7 +30,7 @@ from inercal.strapdown.batch import (
     left_over,
     variances_of,
 )
-from inercal.strapdown.left_out import DRIFT, Tested, tests
+from inercal.strapdown.left_out import DRIFT, Tested, drifts, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples
@@ -206,11 +206,9 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
             continue
         tested, drifting = tests(shown.fit, shown.settings), found.noise.walks
         if not _by_others(shown.fit, tested, found.gain, drifting):
-            ramps = tuple(
-                each for each in tested if drifting and each.own > each.limit and each.candidate.code == DRIFT
-            )
+            ramps = drifts(shown.fit, shown.settings) if drifting else []
             noise = replace(found.noise, estimate=names)
-            shown = Shown(replace(settings, noise=noise), found.fit, ramps)
+            shown = Shown(replace(settings, noise=noise), found.fit, tuple(ramps))
     return shown
 
 
