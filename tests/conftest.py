@@ -20,6 +20,9 @@ LIMIT = 2.0
 YARDSTICK = 0.05
 """Processor time of `yardstick` where the marks were set [s]."""
 
+WAITING = {"test_book.py", "test_cluster.py", "test_workbench_browser.py"}
+"""Tests of what other processes do, that alone keep few processors busy."""
+
 # A shell that starts the tests behind its back (&, nohup) has them ignore interrupts, and all programs they start, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGHUP"):
@@ -94,14 +97,14 @@ def undrawn():
         yield
 
 
+def pytest_collection_modifyitems(config, items):
+    """What mostly waits for other processes comes first: at the end nothing would be left to run beside it."""
+    if config.getoption("within") is None:
+        items.sort(key=lambda item: item.path.name not in WAITING)
+
+
 def pytest_collection_finish():
     """What tests are made of is no garbage: none of the collections that follow looks at it."""
-    gc.freeze()
-
-
-def pytest_sessionfinish():
-    """pytest ends with five full collections in each worker."""
-    gc.collect()
     gc.freeze()
 
 

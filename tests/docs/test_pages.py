@@ -44,7 +44,7 @@ SLOW = [
     "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
 ]
-#: X; what they run is in other tests too
+#: pages that take six seconds or more; what they run is in other tests too
 LONG = [
     "docs/how-to/calibrate-a-platform.md",
     "docs/how-to/calibrate-a-strapdown-unit.md",

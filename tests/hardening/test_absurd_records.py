@@ -174,7 +174,6 @@ RARE = {
     "1e-200",
     "one of 1e160",
     "no stamps",
-    "nanoseconds",
     "1e-300 s",
     "1e300 s",
     "days",

@@ -397,7 +397,7 @@ STREAMS = {
     [
         killed_in_a_write,
         pytest.param(killed_before_it_is_in_place, marks=pytest.mark.campaign),
-        pytest.param(killed_once_it_is_in_place, marks=pytest.mark.campaign),
+        killed_once_it_is_in_place,
     ],
 )
 def test_a_stream_killed_while_it_saves_goes_on_with_the_same_digits(

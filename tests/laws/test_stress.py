@@ -15,7 +15,7 @@ from inercal.estimate.basis import Basis
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
 
-RUNS, PARTS = 500, 16
+RUNS, PARTS = 500, 8
 
 
 @pytest.mark.slow

@@ -150,13 +150,7 @@ def test_readings_that_freeze(sensors, words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("floor", "words"),
-    [
-        pytest.param(2.0, "explain the innovations", marks=pytest.mark.campaign),
-        (5.0, "as with 1/f noise"),
-    ],
-)
+@pytest.mark.parametrize(("floor", "words"), [(2.0, "explain the innovations"), (5.0, "as with 1/f noise")])
 def test_flicker_of_accelerometers_is_no_walk_of_the_gyros(floor, words):
     """Noise of both is no Markov process: the stronger it is, the less a bias that walks makes innovations white."""
     noisy = replace(STUDY, disturbances=Disturbances(flicker=floor * MICRO_G))

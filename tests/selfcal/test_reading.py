@@ -86,6 +86,8 @@ def test_a_simulated_record_is_the_recording_again():
     assert not found.measured
     assert found.findings == ()
     assert found.sources == RECORD.sources
+    for each in (found.rate, found.th, found.acc, replace(found, acc=np.asfortranarray(found.acc)).acc):
+        assert each.flags.c_contiguous  # as the kernels are compiled for
 
 
 @pytest.mark.parametrize("suffix", [*SUFFIXES, ".csv.gz", ".mat"])

@@ -61,7 +61,7 @@ class Recording:
     def __post_init__(self) -> None:
         # For arrays that lie otherwise in memory, all kernels would be compiled once more.
         for name in ("rate", "th", "acc"):
-            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=float))
 
     @property
     def dt(self) -> Array:
