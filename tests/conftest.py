@@ -105,6 +105,7 @@ def pytest_collection_modifyitems(config, items):
 
 def pytest_collection_finish():
     """What tests are made of is no garbage: none of the collections that follow looks at it."""
+    gc.collect()
     gc.freeze()
 
 

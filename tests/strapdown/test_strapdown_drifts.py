@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from inercal.strapdown.left_out import Candidate, Posed, told_apart
+from inercal.strapdown.left_out import tests as left_out
 
 ROWS, COEFFICIENTS = 400, 4
+SENSORS = {0: "one", 1: "other"}
 
 
 def problem(alike, first, second, seed=0):
@@ -17,13 +19,14 @@ def problem(alike, first, second, seed=0):
     size = np.array([1.0, -1.0, 1.0]) / np.sqrt(3.0 * ROWS)
     y = rng.standard_normal(ROWS) + first * one @ size + second * other @ size
     J = np.hstack([known, one, other])
-    candidates = [Candidate(name, "bias_drift", "", "", np.empty(0), np.ones(3)) for name in ("one", "other")]
+    columns = np.empty((1, 6, 3))
+    candidates = [Candidate(name, "bias_drift", name, "", columns, np.ones(3)) for name in SENSORS.values()]
     places = [COEFFICIENTS + np.arange(3), COEFFICIENTS + 3 + np.arange(3)]
     return Posed(candidates, places, J.T @ J, J.T @ y, np.ones(COEFFICIENTS)), J, y
 
 
 def names(alike, first, second, seed=0):
-    return [each.candidate.name for each in told_apart(problem(alike, first, second, seed)[0], [0, 1])]
+    return [each.candidate.name for each in told_apart(problem(alike, first, second, seed)[0], SENSORS)]
 
 
 def left(J, y):
@@ -35,24 +38,33 @@ def left(J, y):
 def test_falls_and_shifts_are_those_of_fits_with_and_without_the_columns(alike):
     made, J, y = problem(alike, 10.0, 5.0)
     p, q, r = COEFFICIENTS, COEFFICIENTS + 3, COEFFICIENTS + 6
-    alone, beside = made.tested(1), made.tested(1, beside=0)
+    alone, beside = (made.tested(made.candidates[1], 1, beside=other) for other in (None, 0))
     assert alone.drop == pytest.approx(left(J[:, :p], y) - left(J[:, [*range(p), *range(q, r)]], y))
     assert beside.drop == pytest.approx(left(J[:, :q], y) - left(J, y))
-    shift = (np.linalg.lstsq(J, y)[0] - np.append(np.linalg.lstsq(J[:, :q], y)[0], np.zeros(3)))[:p]
-    np.testing.assert_allclose(beside.shift, shift, atol=1e-12)
+    both = made.tested(made.candidates[0], 0, 1)
+    assert both.drop == pytest.approx(left(J[:, :p], y) - left(J, y))
+    shift = np.linalg.lstsq(J, y)[0][:p]
+    np.testing.assert_allclose(both.shift, shift - np.linalg.lstsq(J[:, :p], y)[0], atol=1e-12)
+    np.testing.assert_allclose(beside.shift, shift - np.linalg.lstsq(J[:, :q], y)[0][:p], atol=1e-12)
 
 
 def test_the_weaker_one_that_is_the_image_of_the_stronger_is_not_shown():
-    """Of 0.6 of its columns a strong effect makes 36 % of its fall there: beyond chance, and nothing of its own."""
+    """With 0.6 of its columns a strong effect makes 36 % of its fall there: beyond chance, and nothing of its own. By
+    chance the weaker one seems to add to it in one of 200."""
+    found = []
     for seed in range(20):
         made, *_ = problem(0.6, 12.0, 0.0, seed)
-        assert made.tested(1).significant
-        assert names(0.6, 12.0, 0.0, seed) == ["one"]
+        assert made.tested(made.candidates[1], 1).significant
+        found.append(names(0.6, 12.0, 0.0, seed))
+    assert found.count(["one"]) >= 18
 
 
-def test_both_are_shown_where_both_are_there():
+def test_both_are_one_effect_where_both_are_there():
     for seed in range(20):
-        assert set(names(0.6, 12.0, 12.0, seed)) == {"one", "other"}
+        (found,) = told_apart(problem(0.6, 12.0, 11.0, seed)[0], SENSORS)
+        assert "of the ones" in found.candidate.words
+        assert "of the others" in found.candidate.words
+        assert len(found.score) == 6
 
 
 def test_both_are_shown_where_each_hides_the_other():
@@ -60,15 +72,27 @@ def test_both_are_shown_where_each_hides_the_other():
     alone = 0
     for seed in range(20):
         made, *_ = problem(0.98, 40.0, -40.0 / 0.98, seed)
-        alone += made.tested(0).significant + made.tested(1).significant
-        assert {each.candidate.name for each in told_apart(made, [0, 1])} == {"one", "other"}
+        alone += sum(made.tested(each, k).significant for k, each in enumerate(made.candidates))
+        assert len(told_apart(made, SENSORS)[0].score) == 6
     assert alone <= 5
 
 
-def test_which_of_two_it_is_nobody_can_tell_where_they_explain_as_much():
+def test_either_is_said_to_be_it_where_both_explain_as_much():
+    """Columns that are alike but for 1 %: by chance one is needed beside the other in one of 100."""
+    found = []
     for seed in range(20):
-        assert set(names(0.995, 8.0, 0.0, seed)) == {"one", "other"}
+        shown = told_apart(problem(0.9999, 8.0, 0.0, seed)[0], SENSORS)
+        found.append(sorted(each.candidate.words for each in shown))
+    assert found.count(["one, or other", "other, or one"]) >= 18
 
 
 def test_chance_is_not_shown():
-    assert sum(len(names(0.6, 0.0, 0.0, seed)) > 0 for seed in range(200)) <= 8  # 1 %: 9 and more at 5e-5
+    assert sum(len(names(0.6, 0.0, 0.0, seed)) > 0 for seed in range(200)) <= 8  # 1 %: 9 and more at 2e-4
+
+
+def test_one_drift_alone_and_none():
+    made, *_ = problem(0.6, 12.0, 0.0)
+    assert [each.candidate.name for each in told_apart(made, {1: "other"})] == ["other"]
+    assert told_apart(made, {}) == []
+    nothing = made._replace(candidates=[], places=[])
+    assert left_out(nothing) == []

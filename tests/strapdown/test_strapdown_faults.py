@@ -38,15 +38,15 @@ def test_a_sound_record_of_another_simulator_is_ok_and_met(name, runs):
     assert (0.5 * low if name == "none" else low) < np.sum(squares) < high
 
 
-def named(name, *words):
-    """Assert that the effects of a case are those that are named, in this order, and that they do harm."""
+def named(name, words):
+    """Assert that the effect of a case is the one that is named, and that it does harm."""
     estimate, _ = result_of(name)
     assert estimate.status in (Status.SUSPECT, Status.INCONSISTENT)
-    found = [each for each in estimate.findings if each.code in ("unmodelled", "bias_drift", "site_suspect")]
-    assert len(found) == len(words)
-    for finding, expected in zip(found, words, strict=True):
-        assert expected in finding.message
-        assert finding.harm
+    (finding,) = (
+        each for each in estimate.findings if each.code in ("unmodelled", "bias_drift", "site_suspect")
+    )
+    assert words in finding.message
+    assert finding.harm
 
 
 def test_a_term_outside_the_model_is_named():
@@ -63,17 +63,15 @@ def test_a_term_outside_the_model_is_named():
         ("K2 of 50 ug/g^2, not fitted", 'add "k2" to terms'),
         ("gyros drift by 10 deg/h", "biases of the gyros that drift"),
         ("accelerometers drift by 500 ug", "biases of the accelerometers that drift"),
+        (
+            "both drift, by 10 deg/h and 500 ug",
+            "biases of the accelerometers and of the gyros that drift",
+        ),
         ("latitude wrong by 10 deg", "check site.latitude"),
     ],
 )
 def test_every_effect_outside_the_model_is_named(name, words):
     named(name, words)
-
-
-@pytest.mark.campaign
-def test_drifts_of_both_are_named():
-    words = [f"biases of the {sensor}s that drift" for sensor in ("accelerometer", "gyro")]
-    named("both drift, by 10 deg/h and 500 ug", *words)
 
 
 @pytest.mark.campaign

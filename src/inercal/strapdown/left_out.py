@@ -7,17 +7,18 @@ other coefficients go with it, takes a few small matrices and no further fit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.strapdown.arrow import forward
 from inercal.strapdown.batch import Fit
 from inercal.strapdown.coefficients import GROUPS, K0, LATITUDE, OPTIONS, D
 from inercal.strapdown.limits import LIMITS
-from inercal.strapdown.settings import StrapdownSettings
+from inercal.strapdown.settings import Noise, StrapdownSettings
 
 _WORDS = {
     "k2": "second-order coefficients of the accelerometers",
@@ -72,6 +73,9 @@ class Tested(NamedTuple):
 DRIFT = "bias_drift"
 """Code of biases that drift in proportion to time."""
 
+RAMP = "_ramp"
+"""How names of such drifts end, after that of the sensor."""
+
 
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
     """Effects that a fit may have left out."""
@@ -95,14 +99,21 @@ def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
     noise = settings.noise
     for sensor, walk, at in (("gyro", noise.gyro_walk, D), ("accelerometer", noise.accelerometer_walk, K0)):
         if walk == 0.0:
-            yield Candidate(
-                f"{sensor}_ramp",
-                DRIFT,
-                f"biases of the {sensor}s that drift over the recording",
-                f"let the unit warm up, or state noise.{sensor}_walk",
-                part[:, None, None] * G[:, :, at],
-                prior[at],
-            )
+            yield _drift((sensor,), part[:, None, None] * G[:, :, at], prior[at])
+
+
+def _drift(sensors: tuple[str, ...], columns: Array, prior: Array) -> Candidate:
+    """Biases of the sensors that drift in proportion to time."""
+    whose = " and ".join(f"of the {each}s" for each in sensors)
+    walks = " and ".join(f"noise.{each}_walk" for each in sensors)
+    return Candidate(
+        f"{'_and_'.join(sensors)}{RAMP}",
+        DRIFT,
+        f"biases {whose} that drift over the recording",
+        f"let the unit warm up, or state {walks}",
+        columns,
+        prior,
+    )
 
 
 class Posed(NamedTuple):
@@ -111,17 +122,17 @@ class Posed(NamedTuple):
     candidate, and the ``prior`` (p,) standard deviations of the fit."""
 
     candidates: list[Candidate]
-    places: list[Array]
+    places: list[NDArray[np.int64]]
     H: Array
     g: Array
     prior: Array
 
-    def tested(self, number: int, beside: int | None = None) -> Tested | None:
-        """The score test of a candidate, with another one freed before it where ``beside`` is given; None where the
-        information was lost in rounding."""
+    def tested(self, candidate: Candidate, *numbers: int, beside: int | None = None) -> Tested | None:
+        """The score test of a candidate whose parameters are those of these ``numbers``, with those of another one
+        freed before it where ``beside`` is given; None where the information was lost in rounding."""
         from scipy.special import chdtri
 
-        p, q = len(self.prior), self.places[number]
+        p, q = len(self.prior), np.concatenate([self.places[each] for each in numbers])
         free = np.arange(p) if beside is None else np.append(np.arange(p), self.places[beside])
         by = np.asarray(np.linalg.solve(self.H[np.ix_(free, free)], self.H[np.ix_(free, q)]), dtype=float)
         score = self.g[q] - by.T @ self.g[free]
@@ -131,7 +142,7 @@ class Posed(NamedTuple):
         drop = float(score @ np.linalg.solve(information, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(self.candidates)))
         moved = -self.prior[:, None] * by[:p]
-        return Tested(self.candidates[number], drop, limit, moved, score, information)
+        return Tested(candidate, drop, limit, moved, score, information)
 
 
 def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
@@ -160,32 +171,53 @@ def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
     return Posed(tried, places, scaled, g[2 * m + 3 :] * size, fit.prior)
 
 
-def tests(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
-    """Score tests of all that a fit may have left out, the largest fall of chi-square first."""
-    problem = posed(fit, settings)
-    done = (problem.tested(number) for number in range(len(problem.candidates)))
+def tests(problem: Posed) -> list[Tested]:
+    """Score tests of all that a fit may have left out, the largest fall of chi-square first; without those whose
+    information was lost in rounding."""
+    done = (problem.tested(each, number) for number, each in enumerate(problem.candidates))
     return sorted((each for each in done if each), key=lambda each: -each.drop)
 
 
-def drifts(fit: Fit, settings: StrapdownSettings) -> list[Tested]:
-    """Drifts of biases that a recording shows, the stronger first (`told_apart`)."""
-    problem = posed(fit, settings)
-    return told_apart(problem, [k for k, each in enumerate(problem.candidates) if each.code == DRIFT])
+def drifts(problem: Posed, noise: Noise) -> list[Tested]:
+    """Drifts of biases that a recording shows, of the sensors whose biases may walk by this noise (`told_apart`)."""
+    walking = {"gyro": noise.gyro_walk > 0.0, "accelerometer": noise.accelerometer_walk > 0.0}
+    sensors = {
+        number: each.name.removesuffix(RAMP)
+        for number, each in enumerate(problem.candidates)
+        if each.code == DRIFT
+    }
+    return told_apart(problem, {number: each for number, each in sensors.items() if walking[each]})
 
 
-def told_apart(problem: Posed, numbers: list[int]) -> list[Tested]:
-    """Of two effects that look alike in part those that a recording shows.
+def told_apart(problem: Posed, sensors: Mapping[int, str]) -> list[Tested]:
+    """Drifts that a recording shows, of candidates by their numbers, one or two of them.
 
-    Where both together explain more than the stronger one by more than chance, both are shown, each tested beside the
-    other. Else the stronger one is, and the weaker one, where it explains as much but for chance, since none can say
-    which of them it is.
+    Those of gyros and of accelerometers look alike in part. Where each explains, beside the other, more than chance
+    does, they are one effect of both. Else the one without which the other leaves more than chance is shown; where
+    neither is needed beside the other, each that explains more than chance, in the words of both, for either may be it.
     """
-    alone = [(number, each) for number in numbers if (each := problem.tested(number))]
-    alone.sort(key=lambda each: -each[1].drop)
+    alone = {k: found for k in sensors if (found := problem.tested(problem.candidates[k], k)) is not None}
+
+    def needed(one: int, other: int) -> bool:
+        found = problem.tested(problem.candidates[one], one, beside=other)
+        return found is not None and found.significant
+
     if len(alone) == 2:
-        (first, stronger), (second, _) = alone
-        beside = problem.tested(first, second), problem.tested(second, first)
-        if all(each and each.significant for each in beside):
-            return [each for each in beside if each]
-        alone = [each for each in alone if each[1].drop >= stronger.drop - each[1].limit]
-    return [each for _, each in alone if each.significant]
+        weaker, stronger = sorted(alone, key=lambda k: alone[k].drop)
+        if needed(weaker, stronger):  # and so the stronger one is
+            first, second = (problem.candidates[k] for k in (stronger, weaker))
+            columns = np.concatenate([first.columns, second.columns], axis=2)
+            prior = np.concatenate([first.prior, second.prior])
+            effect = _drift((sensors[stronger], sensors[weaker]), columns, prior)
+            both = problem.tested(effect, stronger, weaker)
+            return [both] if both else []
+        if needed(stronger, weaker):
+            del alone[weaker]
+    shown = sorted((each for each in alone.values() if each.significant), key=lambda each: -each.drop)
+    if len(shown) < 2:
+        return shown
+    one, other = (each.candidate.words for each in shown)
+    return [
+        each._replace(candidate=each.candidate._replace(words=words))
+        for each, words in zip(shown, (f"{one}, or {other}", f"{other}, or {one}"), strict=True)
+    ]

@@ -25,7 +25,7 @@ from inercal.strapdown.budget import sources
 from inercal.strapdown.coefficients import ALWAYS, GRAVITY, LATITUDE, USUAL, group_of, names, slope, stated
 from inercal.strapdown.considered import considered
 from inercal.strapdown.error_state import Filtered
-from inercal.strapdown.left_out import Tested, tests
+from inercal.strapdown.left_out import Tested, posed, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.restricted import residuals
 from inercal.strapdown.samples import Samples, freed
@@ -91,7 +91,7 @@ def assemble(
     )
     if settings.time_base_u > 0.0:
         parts.append(TypeB("time base", settings.time_base_u, "1", scales))
-    tested = tests(fit, settings)
+    tested = tests(posed(fit, settings))
     fitted_u = combine(found, parts).u
     drifts = considered(tested, settings, J, found, fitted_u)
     uncertainty = combine(found, [*parts, drifts.source] if drifts else parts)

@@ -30,7 +30,7 @@ from inercal.strapdown.batch import (
     left_over,
     variances_of,
 )
-from inercal.strapdown.left_out import DRIFT, Tested, drifts, tests
+from inercal.strapdown.left_out import DRIFT, Tested, drifts, posed, tests
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.rests import Nodes
 from inercal.strapdown.samples import Samples
@@ -204,9 +204,9 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
         found = with_noise(samples, nodes, shown.settings, shown.fit, names) if names else None
         if not found:
             continue
-        tested, drifting = tests(shown.fit, shown.settings), found.noise.walks
-        if not _by_others(shown.fit, tested, found.gain, drifting):
-            ramps = drifts(shown.fit, shown.settings) if drifting else []
+        problem = posed(shown.fit, shown.settings)
+        if not _by_others(shown.fit, tests(problem), found.gain, found.noise.walks):
+            ramps = drifts(problem, found.noise)
             noise = replace(found.noise, estimate=names)
             shown = Shown(replace(settings, noise=noise), found.fit, tuple(ramps))
     return shown
