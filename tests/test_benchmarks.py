@@ -183,7 +183,7 @@ def test_a_short_campaign_of_faults(capsys, monkeypatch):
     assert "stuck_encoder 1" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_stress_campaign_goes_on_where_it_stopped(tmp_path, capsys, monkeypatch):
     """Kept in chunks, resumed, chunks with a broken law made again, in a table: as one undisturbed campaign."""
     stress = importlib.import_module("stress")

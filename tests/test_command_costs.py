@@ -121,7 +121,7 @@ print("peak:", re.search(r"VmHWM:\\s*(\\d+) kB", Path("/proc/self/status").read_
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak of memory is told in KiB as on Linux")
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(each, marks=[pytest.mark.campaign] * (not each.startswith("aoa"))) for each in BYTES],
+    [pytest.param(each, marks=[pytest.mark.campaign] * (not each.startswith("inspect"))) for each in BYTES],
 )
 def test_memory_grows_by_no_more_than_so_many_bytes_a_row(command, folder):
     peaks = {}

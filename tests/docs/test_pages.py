@@ -37,10 +37,8 @@ SLOW = [
     "docs/published/zhao-2023.md",
     "docs/theory/angle-of-attack-fusion.md",
     "docs/theory/self-calibration-filters.md",
-    "docs/tutorials/angle-of-attack.md",
     "docs/tutorials/bench-to-certificate.md",
     "docs/tutorials/five-years.md",
-    "docs/tutorials/self-calibration.md",
     "docs/tutorials/strapdown.md",
     "docs/tutorials/turntable.md",
 ]
@@ -53,6 +51,8 @@ LONG = [
     "docs/how-to/measure-angle-of-attack.md",
     "docs/how-to/poses-or-turns.md",
     "docs/how-to/validate.md",
+    "docs/tutorials/angle-of-attack.md",
+    "docs/tutorials/self-calibration.md",
     "docs/tutorials/your-own-platform.md",
 ]
 APART = ROOT / "docs" / "how-to" / "repeat-and-compare.md"

@@ -190,7 +190,7 @@ class Losing(Cluster):
             yield chunk, work(chunk)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_of_units_that_went_out_together_one_that_ends_its_process_is_a_row(there, tmp_path, monkeypatch):
     folder, out = few(there, tmp_path / "copy", 4), tmp_path / "lost"
     for name in ("units", "results"):

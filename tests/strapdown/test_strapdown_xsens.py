@@ -85,6 +85,7 @@ def test_chi_square_falls_as_in_another_program(terms, expected):
     assert found.statistics["chi2"] == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.campaign
 def test_noise_that_the_record_shows_is_that_found_by_hand():
     """Walks of 40 ug/sqrt(s) and 1 cm/s over turns made the halves of the record agree in another program."""
     found = with_all()

@@ -74,7 +74,7 @@ DRIFT = "bias_drift"
 """Code of biases that drift in proportion to time."""
 
 RAMP = "_ramp"
-"""How names of such drifts end, after that of the sensor."""
+"""End of the name of such a drift, after that of the sensor."""
 
 
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
