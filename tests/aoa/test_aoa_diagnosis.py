@@ -50,6 +50,7 @@ def test_an_axis_that_is_turned(degrees):
     assert number == pytest.approx(-degrees, abs=0.03)
 
 
+@pytest.mark.slow
 def test_an_axis_that_is_turned_in_one_oscillation():
     """Heights and the gyro's scale take its effect, none of them by what is unlikely alone; together they are."""
     swung = study(motion=replace(BASE, mean=15.0 * DEG, duration=12.0, sample_rate=500.0))

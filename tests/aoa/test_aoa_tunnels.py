@@ -308,6 +308,7 @@ def test_a_scale_of_the_gyro_that_no_reading_shows_is_told_with_what_it_costs():
     assert told(replace(recording, gyro=np.full_like(run.gyro, np.nan)), "scale") == []
 
 
+@pytest.mark.slow
 def test_a_gyro_that_is_no_such_gyro_has_a_wider_prior_and_u_holds():
     """1 % under one sine, where positions and heights take nearly all of it: 5 u off under the usual prior of 0.1 %.
     Without a choice of the recording it is `prior_suspect`. Of two draws of constants the mean square over u^2 is
@@ -332,6 +333,7 @@ def test_a_gyro_that_is_no_such_gyro_has_a_wider_prior_and_u_holds():
     assert said.harm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -353,6 +355,7 @@ def test_another_error_is_not_taken_for_a_scale_of_the_gyro(change, words):
     assert re.search(words, said.message)
 
 
+@pytest.mark.slow
 def test_arms_in_millimetres_are_named_where_the_motion_is_too_slow_to_show_them():
     """A polar of steps fits with arms of 250 m, by a snap and a plunge that allow for what they make: 5 u off."""
     run = simulate(Tunnel("polar", duration=30.0), 3000)

@@ -174,6 +174,7 @@ def test_there_are_24_mountings_all_of_them_right_handed():
 # uncertainties
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [20, pytest.param(RUNS, marks=pytest.mark.campaign)])
 def test_intervals_cover_the_truth_as_often_as_they_say(runs):
     """Of 20 runs 14 hits are the exact limit of one coefficient at a risk of 4e-5; 0.88 of all together is four and
@@ -381,6 +382,7 @@ def test_the_study_says_how_the_instrument_sits():
         check(AidedTable, {"mounting": ["+x", "+y", "-z"]}, "study", StudyError)
 
 
+@pytest.mark.slow
 def test_pictures_of_sound_and_failed_calibrations(noisy):
     for record in (
         noisy[0],

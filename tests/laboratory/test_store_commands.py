@@ -30,6 +30,7 @@ def said(capsys, *words, code=0):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_a_result_is_kept_shown_and_made_once_more(lab, capsys):
     """Kept by the command itself, with report; the rerun gives the same digits on the same machine."""
     assert run([*CALIBRATE, "--out", "cal.json", "--report", "cal.html", "--keep"]) == 0

@@ -134,6 +134,7 @@ def test_the_command_fits_records_together_and_names_what_changed(tmp_path):
     assert apart.startswith("the records contradict each other")
 
 
+@pytest.mark.slow
 def test_errors_of_the_rig_that_no_state_has_are_in_u_of_a_common_fit(tmp_path):
     """K2 of 10 ug/g^2 is the same in all records: more than 4 u off by noise and prior, within 4 u as stated, most
     of some u, and told."""

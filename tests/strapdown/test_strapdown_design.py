@@ -176,6 +176,7 @@ SEARCH = [
 ]
 
 
+@pytest.mark.slow
 def test_a_found_plan_is_a_table_of_a_study(folder, capsys):
     command = ["design", "strapdown", "strapdown.toml", *SEARCH]
     assert run([*command, "--out", "plan.toml", "--report", "page.html", "--quiet"]) == 0

@@ -136,6 +136,7 @@ def named(case):
     return estimate, errors
 
 
+@pytest.mark.slow
 def test_turns_that_are_clipped_leave_places_at_their_prior():
     estimate, _ = named("gyro clips at 1.0 rad/s")
     assert estimate.status is Status.UNOBSERVABLE

@@ -98,6 +98,7 @@ def test_a_stream_gives_the_digits_of_a_file(folder, calibration, capsys, monkey
     assert capsys.readouterr().out.splitlines() == (folder / "some-out.csv").read_text().splitlines()
 
 
+@pytest.mark.slow
 def test_a_stream_goes_on_where_it_was_stopped(folder, calibration, capsys):
     lines = (folder / "run.csv").read_bytes().splitlines(keepends=True)
     for name, part in (("one", lines[:2500]), ("all", lines[:3000])):

@@ -85,7 +85,7 @@ def test_chi_square_falls_as_in_another_program(terms, expected):
     assert found.statistics["chi2"] == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.campaign
+@pytest.mark.slow
 def test_noise_that_the_record_shows_is_that_found_by_hand():
     """Walks of 40 ug/sqrt(s) and 1 cm/s over turns made the halves of the record agree in another program."""
     found = with_all()
@@ -105,6 +105,7 @@ def test_halves_of_the_record_agree():
     assert low < np.mean(np.square(z)) < high
 
 
+@pytest.mark.slow
 def test_values_are_those_of_many_poses():
     """Within 2 u of their difference: two uses of one record, so that it is not tight; u is smaller, but of K1."""
     found, poses = with_all(), of_poses()

@@ -164,6 +164,7 @@ def test_with_them_alpha_and_beta_are_those_of_the_tracked_roll(block, tmp_path,
     assert set(given) == set(out)
 
 
+@pytest.mark.slow
 def test_a_prior_from_a_turntable_puts_the_sensors_right_as_in_the_file(tmp_path):
     """An axis that is off by 1 mrad: the stream corrects the study as the whole file does."""
     table = replace(BASE, kind="two-tone", duration=20.0, sample_rate=500.0, mean=20.0 * DEG, amplitude=25.0 * DEG,

@@ -196,6 +196,7 @@ def test_an_earth_that_turns_backward(monkeypatch, fresh):
     assert "platform-truth" in red(selfcal.CASES, "platform-truth")
 
 
+@pytest.mark.slow
 def test_an_earth_that_turns_backward_under_a_strapdown_unit(monkeypatch, fresh):
     monkeypatch.setattr("inercal.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
     assert "rests-psins-truth" in red(strapdown.CASES, "rests-psins-truth")
