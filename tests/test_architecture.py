@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 
 #: lowest first; a module imports from its own floor and those below
 FLOORS = [
-    {"arrays", "errors", "inputs"},
+    {"addresses", "arrays", "errors", "inputs"},
     {"findings", "units"},
     {"_jit", "_files", "_toml", "keys"},
     {"geometry"},

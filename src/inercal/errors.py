@@ -19,6 +19,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from inercal.addresses import shown_address, without_secrets
+
 
 class Judged(Protocol):
     """A result with a verdict: `inercal.estimate.result.Estimate`, which stands above this floor."""
@@ -37,12 +39,12 @@ class InercalError(Exception):
 
 
 class InputError(InercalError):
-    """Bad input. ``where`` names the file, line, column, key or option at fault."""
+    """Bad input. ``where`` names the file, line, column, key or option at fault. Secrets of addresses are hidden."""
 
     def __init__(self, where: object, message: str) -> None:
-        self.where = str(where)
-        self.message = message
-        super().__init__(f"{where}: {message}")
+        self.where = shown_address(str(where))
+        self.message = without_secrets(message)
+        super().__init__(f"{self.where}: {self.message}")
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str]]:
         """Survive the way back from a worker process."""

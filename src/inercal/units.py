@@ -10,6 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from inercal.addresses import shown_address
 from inercal.errors import QuantityError
 
 STANDARD_GRAVITY = 9.80665
@@ -292,9 +293,9 @@ def parse_quantity(text: object, dimension: str, where: object, example: str = "
 
 
 def shown(value: object) -> str:
-    """Text of a value for a message: its repr, at most 80 characters."""
+    """Text of a value for a message: its repr without secrets, at most 80 characters."""
     try:
-        text = repr(value)
+        text = repr(shown_address(value)) if isinstance(value, str) else shown_address(repr(value))
     except (ValueError, RecursionError):  # an integer of thousands of digits, tables in tables without end
         return f"a {type(value).__name__} too large to print"
     return text if len(text) <= 80 else text[:77] + "..."

@@ -448,7 +448,7 @@ def test_passwords_are_not_shown():
     from inercal.laboratory.place import place_of
 
     place = place_of("postgresql://lab:secret@host/name")
-    assert place.shown == "postgresql://lab@host/name"
+    assert place.shown == "postgresql://lab:***@host/name"
     assert "secret" in place.url
     assert place_of(None, {"INERCAL_STORE": "/x"}).shown == "/x"
     assert Path(place_of(None, {}).shown).name == "store"

@@ -12,6 +12,7 @@ import warnings
 from types import FrameType
 
 from inercal import __version__
+from inercal.addresses import shown_address, without_secrets
 from inercal.errors import InercalError
 
 # The matrices here are small: threads of the linear algebra library cost more than they bring.
@@ -110,7 +111,7 @@ def run(arguments: list[str] | None = None) -> int:
             "the traceback that INERCAL_DEBUG=1 shows"
         )
     abandon_output()
-    problem = " ".join(problem.split())
+    problem = " ".join(without_secrets(problem).split())
     if len(problem) > _LONGEST:  # the beginning says where, the end what was expected
         problem = f"{problem[: 2 * _LONGEST // 3]} ... {problem[-_LONGEST // 3 :]}"
     _say(f"error: {problem}")
@@ -138,8 +139,8 @@ def _say(text: str) -> None:
 
 
 def command_line() -> list[str]:
-    """Arguments of the command that runs, as they were typed."""
-    return [*_LINE]
+    """Arguments of the command that runs, as they were typed, but for secrets of addresses."""
+    return [shown_address(argument) for argument in _LINE]
 
 
 def printable(text: str) -> str:

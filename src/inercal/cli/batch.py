@@ -58,7 +58,7 @@ def batch(
     count = count_of(workers, cluster)
     if store is not None and not keep:
         raise InputError("--store", "found without --keep, expected with it")
-    place = open_store(store).where if keep else None
+    place = open_store(store).place.given if keep else None
     clock = time.perf_counter()
     with reading(output, "calibrating") as progress:
         result = of_fleet(

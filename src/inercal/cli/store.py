@@ -66,6 +66,31 @@ def store_check(*, store: StoreOption = None, output: Output = Output()) -> int:
     return EXIT_BAD_VERDICT if found.faults else 0
 
 
+def store_scrub(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+    """Take secrets of addresses out of a store of inercal 0.2.0 or earlier."""
+    from inercal.estimate.result import without_coefficients
+    from inercal.laboratory.catalog import SHORT
+    from inercal.laboratory.scrub import scrub
+    from inercal.laboratory.store import open_store
+    from inercal.records.places import counted
+
+    opened = open_store(store)
+    done = scrub(opened)
+    for sha256 in done.files:
+        output.say(f"file {sha256[:SHORT]}: holds a secret and stays, for results rest on it")
+    freed = [
+        counted(len(done.subjects["keep"]), "result"),
+        counted(len(done.subjects["certificate"]), "certificate"),
+    ]
+    words = (
+        f"{' and '.join(freed)} freed of secrets, head of the chain before: {done.before}, now: {done.head}; change "
+        "the passwords, for what was handed out or copied before holds them still"
+        if done.objects or done.texts
+        else f"no secret found in {opened.where}"
+    )
+    emit(without_coefficients("store scrub", words, vars(done)), words, output)
+
+
 def store_export(
     folder: Annotated[Path, Parameter(help="A new or empty folder.")],
     /,

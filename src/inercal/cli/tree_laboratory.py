@@ -21,6 +21,13 @@ LABORATORY = {
         "there are faults.",
         "inercal store check --store lab",
     ),
+    ("store", "scrub"): (
+        "inercal.cli.store:store_scrub",
+        "Take passwords, keys and tokens of addresses out of a store that inercal 0.2.0 or earlier wrote them into.\n\n"
+        "What held one is written anew with *** in its place, and an event in the chain says so, with the head of the "
+        "chain before. Change the passwords all the same: exports, certificates and backups hold them still.",
+        "inercal store scrub --store lab",
+    ),
     ("store", "export"): (
         "inercal.cli.store:store_export",
         "Copy a store into a folder, which is a store itself, with rows, chain and files as they are.",

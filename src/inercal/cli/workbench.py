@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import Output, StoreOption
-from inercal.cli.outcome import emit
+from inercal.cli.outcome import timed
 from inercal.errors import InputError
 
 _PASSWORD = "INERCAL_WORKBENCH_PASSWORD"
@@ -39,6 +39,7 @@ def workbench(
     """Serve the workbench until it is asked to end."""
     from platformdirs import user_data_path
 
+    from inercal.estimate.files import to_json
     from inercal.estimate.result import without_coefficients
     from inercal.workbench.bench import open_bench
     from inercal.workbench.serve import HERE, Door, serve
@@ -50,8 +51,11 @@ def workbench(
     bench = open_bench(root.absolute(), store)
 
     def tell(address: str) -> None:
-        found = without_coefficients("workbench", f"inercal workbench: {address}", {"address": address})
-        emit(found, found.message, output)
+        words = f"inercal workbench: {address}"
+        found = to_json(timed(without_coefficients("workbench", words, {})))
+        output.emit(
+            {**found, "result": {"address": address}}, words
+        )  # with its key, which is meant for the reader
 
     try:
         serve(bench, Door(host, port, password), tell, not browser)

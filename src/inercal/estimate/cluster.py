@@ -13,11 +13,12 @@ import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
+from inercal.addresses import shown_address
 from inercal.errors import InercalError, InputError, MissingExtraError
 from inercal.estimate.executors import Executor, Processes, Serial
 from inercal.inputs import program
@@ -54,8 +55,13 @@ class Cluster:
     ``workers`` are the processes of a local cluster, one for each processor if None.
     """
 
-    address: str
+    address: str = field(repr=False)
     workers: int | None = None
+
+    @property
+    def where(self) -> str:
+        """The address as it may be shown."""
+        return shown_address(self.address)
 
     def map(
         self, work: Callable[[Iterable[int]], T], chunks: Sequence[range]
@@ -69,8 +75,8 @@ class Cluster:
         """
         with _client(self) as client:
             distributed = _distributed()
-            _same_program(client, self.address)
-            name = _brought(client, work, self.address)
+            _same_program(client, self.where)
+            name = _brought(client, work, self.where)
 
             def submitted(chunk: range) -> Any:
                 return client.submit(_done, name, chunk, pure=False)
@@ -87,7 +93,7 @@ class Cluster:
                     except (distributed.comm.CommClosedError, CancelledError, TimeoutError) as error:
                         # the answer went with its worker, or everything with the scheduler
                         if client.status != "running" or times == _AGAIN:
-                            raise _lost(self.address) from error
+                            raise _lost(self.where) from error
                         again = submitted(chunk)
                         futures[again] = chunk, times + 1
                         finished.add(again)
@@ -99,7 +105,7 @@ class Cluster:
                     client.cancel(list(futures), force=True)
                     client.unregister_worker_plugin(name)
         if futures:
-            raise _lost(self.address)
+            raise _lost(self.where)
 
 
 def place(workers: int, cluster: str | None = None) -> Executor:
@@ -147,9 +153,9 @@ def _client(cluster: Cluster) -> Iterator[Any]:
         with made, distributed.Client(made) as client:
             yield client
         return
-    where = cluster.address
-    given: dict[str, Any] = {"scheduler_file": where} if "://" not in where else {"address": where}
-    if "scheduler_file" in given and not Path(where).is_file():
+    address, where = cluster.address, cluster.where
+    given: dict[str, Any] = {"address" if "://" in address else "scheduler_file": address}
+    if "scheduler_file" in given and not Path(address).is_file():
         raise InputError(
             "--cluster", f"found {where!r}, expected {LOCAL!r}, an address such as tcp://host:8786, or a file"
         )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from inercal._files import read_bytes, write_text
+from inercal.addresses import without_secrets
 from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
@@ -82,7 +83,8 @@ def _long_name(name: str) -> str:
 def plain_objects(value: Any) -> Any:
     """Arrays, tuples and mappings as lists and dicts; numbers that are not finite as None.
 
-    In texts, bytes that no encoding knew (as in file names) are written out: they could not be saved.
+    In texts, bytes that no encoding knew (as in file names) are written out: they could not be saved. Secrets of
+    addresses are hidden.
     """
     match value:
         case Mapping():
@@ -94,7 +96,7 @@ def plain_objects(value: Any) -> Any:
         case float() if not math.isfinite(value):
             return None
         case str():
-            return value.encode("utf-8", "backslashreplace").decode("utf-8")
+            return without_secrets(value.encode("utf-8", "backslashreplace").decode("utf-8"))
         case _:
             return value
 

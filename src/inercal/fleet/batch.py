@@ -9,9 +9,10 @@ from os.path import realpath
 from pathlib import Path
 
 from inercal._files import write_text
+from inercal.addresses import holds_secret
 from inercal.errors import InputError, MissingExtraError
 from inercal.estimate.basis import Basis, provenance
-from inercal.estimate.cluster import ChunkLostError, Cluster, place
+from inercal.estimate.cluster import LOCAL, ChunkLostError, Cluster, place
 from inercal.estimate.executors import Executor, Processes
 from inercal.estimate.files import save
 from inercal.estimate.result import Estimate
@@ -92,6 +93,12 @@ def batch(
     '1 of 1 unit is good'
     """
     executor = place(workers, cluster)
+    if store is not None and cluster not in (None, LOCAL) and holds_secret(store):
+        raise InputError(
+            "--store",
+            "found a secret in it, which a cluster would be sent, expected an address without, and the password where "
+            "each worker has it (PGPASSWORD, or ~/.pgpass)",
+        )
     paths = [Path(manifest), Path(study), Path(out), *([] if map is None else [Path(map)])]
     if cluster is not None:  # workers have working folders of their own
         paths = [path.absolute() for path in paths]

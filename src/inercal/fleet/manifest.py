@@ -6,9 +6,10 @@ import csv
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from inercal.addresses import shown_address
 from inercal.errors import InputError
 from inercal.records.read import FORMATS
 from inercal.units import shown
@@ -26,8 +27,16 @@ class Unit:
     takes them."""
 
     serial: str
-    files: tuple[str, ...]
+    files: tuple[str, ...] = field(repr=False)
     keys: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The files as they may be shown, each name once: addresses without their secrets."""
+        names: list[str] = []
+        for shown_file in map(shown_address, self.files):
+            names.append(shown_file if shown_file not in names else f"{shown_file} ({len(names) + 1})")
+        return tuple(names)
 
     @property
     def overrides(self) -> tuple[str, ...]:

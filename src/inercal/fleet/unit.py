@@ -18,9 +18,10 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 from inercal._files import write_text
+from inercal.addresses import hidden_in, shown_address, without_secrets
 from inercal.errors import InercalError, InputError, MissingExtraError
 from inercal.estimate.files import plain_objects, save
 from inercal.estimate.result import Estimate
@@ -85,7 +86,7 @@ class Batch:
     map: Path | None
     folder: Path
     overrides: tuple[str, ...] = ()
-    store: str | None = None
+    store: str | None = field(default=None, repr=False)
 
     def __call__(self, numbers: Iterable[int]) -> list[tuple[int, Row]]:
         """Do the units with these numbers that are not done, and give the rows of all."""
@@ -104,7 +105,7 @@ class Batch:
         paths: Sequence[str] = ()
         try:
             with _local(unit.files) as paths:
-                inputs = {name: _sha256(path) for name, path in zip(unit.files, paths, strict=True)}
+                inputs = {name: _sha256(path) for name, path in zip(unit.names, paths, strict=True)}
                 key = self._key(unit, inputs)
                 before = row_of(self.folder, unit.serial)
                 if before is not None and before.key == key and self._whole(before):
@@ -112,7 +113,7 @@ class Batch:
                 row = self._calibrated(unit, paths, inputs)
                 return self.write(row if row.status == FAILED else replace(row, key=key))
         except (OSError, InercalError) as error:
-            return self.write(Row(unit.serial, REFUSED, _sentence(error, unit.files, paths)))
+            return self.write(Row(unit.serial, REFUSED, _sentence(error, unit, paths)))
 
     def study_of(self, unit: Unit) -> Study:
         """The study of a unit; raises `InputError`."""
@@ -126,12 +127,13 @@ class Batch:
         """SHA-256 of all that the row of a unit rests on."""
         study = self.study_of(unit)
         files = {str(path): _sha256(path) for path in (*study.files, *([self.map] if self.map else []))}
-        parts = [program(), unit.serial, self.overrides, unit.overrides, inputs, files, self.store]
+        store = None if self.store is None else shown_address(self.store)
+        parts = [program(), unit.serial, self.overrides, unit.overrides, inputs, files, store]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
     def _calibrated(self, unit: Unit, paths: Sequence[str], inputs: Mapping[str, str]) -> Row:
         """The row of a unit by a calibration, its result written and kept; raises `InputError` where it cannot be."""
-        begun, names = datetime.now(UTC), dict(zip(paths, unit.files, strict=True))
+        begun, names = datetime.now(UTC), dict(zip(paths, unit.names, strict=True))
         try:
             study = self.study_of(unit)
             estimate = _renamed(_calibration(study, paths, self.map), names)
@@ -139,9 +141,9 @@ class Batch:
                 unit.serial, estimate, specification_of(study.keys.get("specification", {}), self.study)
             )
         except InercalError as error:
-            row = Row(unit.serial, REFUSED, _sentence(error, unit.files, paths))
+            row = Row(unit.serial, REFUSED, _sentence(error, unit, paths))
         except Exception as error:  # a row that says why; the other units go on
-            row = Row(unit.serial, FAILED, f"{type(error).__name__}: {error}")
+            row = Row(unit.serial, FAILED, without_secrets(f"{type(error).__name__}: {error}"))
         else:
             save(estimate, result_path(self.folder, unit.serial))
             if self.store is not None:
@@ -250,17 +252,17 @@ def _fetched(url: str, stack: ExitStack) -> str:
     folder, scheme = stack.enter_context(tempfile.TemporaryDirectory(prefix="inercal-")), url.split("://")[0]
     try:
         system, path = fsspec.core.url_to_fs(url)
-        name = Path(path).name
+        name = Path(urlsplit(url).path if scheme in ("http", "https") else path).name  # without a signature
         if name in ("", ".."):
             raise InputError(url, "names no file, expected one at the end of the address")
         copy = str(Path(folder) / name)
-        system.get(path, copy)
+        system.get_file(path, copy)  # `get` would take the ? of an address for a pattern
     except InputError:
         raise
     except Exception as error:  # each file system has errors of its own
         if isinstance(error, ImportError) and scheme in _EXTRAS:
             raise MissingExtraError(f"a file at {scheme}://", _EXTRAS[scheme]) from error
-        said = " ".join(f"{type(error).__name__}: {error}".split())
+        said = " ".join(hidden_in(f"{type(error).__name__}: {error}", url).split())
         raise InputError(url, f"cannot be fetched ({said})") from error
     return copy
 
@@ -278,14 +280,14 @@ def _sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _sentence(error: Exception, names: Sequence[str], paths: Sequence[str]) -> str:
+def _sentence(error: Exception, unit: Unit, paths: Sequence[str]) -> str:
     """The sentence of an error, in the names of the manifest."""
     text = (
         f"{error.filename}: cannot be read ({error.strerror})" if isinstance(error, OSError) else str(error)
     )
-    for path, name in zip(paths, names, strict=False):
+    for path, name in zip(paths, unit.names, strict=False):
         text = text.replace(path, name)
-    return text
+    return without_secrets(text)
 
 
 def _renamed(estimate: Estimate, names: Mapping[str, str]) -> Estimate:

@@ -13,7 +13,7 @@ from typing import Any
 from sqlalchemy import Connection, Table, insert, select
 
 from inercal.errors import InputError
-from inercal.laboratory.chain import digest_of, happened
+from inercal.laboratory.chain import SCRUB, digest_of, happened, scrubbed, told
 from inercal.laboratory.check import check
 from inercal.laboratory.database import engine_of, migrate, reading, writing
 from inercal.laboratory.objects import Objects
@@ -142,14 +142,21 @@ def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: s
         _insert(target, table, [row for row in theirs[table.__tablename__] if row["result_id"] in names])
     used = [{**row, "reference_id": references[row["reference_id"]]} for row in theirs["used"]]
     _insert(target, Used, [row for row in used if row["result_id"] in names])
-    told = {(row["kind"], row["subject"]): row["digest"] for row in theirs["event"]}
+    events = sorted(theirs["event"], key=lambda row: row["number"])
+    tells, freed = told(events), scrubbed(events)
+
+    def happened_there(kind: str, subject: str) -> None:
+        happened(target, kind, subject, tells[kind, subject])
+        if (kind, subject) in freed:
+            happened(target, f"{SCRUB} {kind}", subject, tells[kind, subject])
+
     for row in new:
-        happened(target, "keep", row["id"], told["keep", row["id"]])
+        happened_there("keep", row["id"])
     superseded = set(target.execute(select(Supersession.result_id)).scalars())
     later = [row for row in theirs["supersession"] if row["result_id"] not in superseded]
     _insert(target, Supersession, later)
     for row in later:
-        happened(target, "supersede", row["result_id"], told["supersede", row["result_id"]])
+        happened_there("supersede", row["result_id"])
     issued = set(target.execute(select(Certificate.number)).scalars())
     certificates = [row for row in theirs["certificate"] if row["number"] not in issued]
     certificates.sort(key=lambda row: row["issued"])
@@ -157,7 +164,7 @@ def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: s
     fresh = {row["number"] for row in certificates}
     _insert(target, Certified, [row for row in theirs["certified"] if row["number"] in fresh])
     for row in certificates:
-        happened(target, "certificate", row["number"], told["certificate", row["number"]])
+        happened_there("certificate", row["number"])
     happened(target, "import", head, digest_of([len(new), len(later), len(certificates)]))
     return Added(len(new), len(later), len(certificates), len(theirs["result"]) - len(new))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
@@ -30,6 +30,24 @@ def digest_of(rows: Any) -> str:
 def hash_of(row: Mapping[str, Any]) -> str:
     """Hash of an event: of all its fields but the hash itself, the hash of the event before among them."""
     return digest_of({key: row[key] for key in ("number", "made", "kind", "subject", "digest", "previous")})
+
+
+SCRUB = "scrub"
+"""Kind of the event that says that secrets were taken out; ``scrub KIND`` says so of the subject of another event."""
+
+
+def told(events: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], str]:
+    """The digest of each kind and subject, as the last event tells it that added the rows or took a secret out."""
+    return {(row["kind"].removeprefix(f"{SCRUB} "), row["subject"]): row["digest"] for row in events}
+
+
+def scrubbed(events: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], str]:
+    """The day on which secrets were taken out of the rows of each kind and subject."""
+    return {
+        (row["kind"].removeprefix(f"{SCRUB} "), row["subject"]): row["made"][:10]
+        for row in events
+        if row["kind"].startswith(f"{SCRUB} ")
+    }
 
 
 def happened(connection: Connection, kind: str, subject: str, digest: str) -> None:

@@ -12,6 +12,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
+from inercal.addresses import hidden_in
 from inercal.errors import InputError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _begin(connection: Connection) -> None:
 @contextmanager
 def reading(engine: Engine, where: str) -> Iterator[Connection]:
     """A transaction that reads; raises `InputError` where the database cannot be reached or read."""
-    with _refusing(where), engine.connect() as connection:
+    with _refusing(engine, where), engine.connect() as connection:
         yield connection
 
 
@@ -83,22 +84,44 @@ def writing(engine: Engine, where: str) -> Iterator[Connection]:
 
     Raises `InputError` where the database cannot be reached or written.
     """
-    with _refusing(where), engine.execution_options(writing=True).begin() as connection:
+    with _refusing(engine, where), engine.execution_options(writing=True).begin() as connection:
         if engine.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
         yield connection
 
 
 @contextmanager
-def _refusing(where: str) -> Iterator[None]:
-    """Turn what the database says into one sentence."""
+def _refusing(engine: Engine, where: str) -> Iterator[None]:
+    """Turn what the database says into one sentence, in which no secret of its address stands."""
     try:
         yield
     except DBAPIError as error:
-        said = " ".join(str(error.orig).split())
+        address = engine.url.render_as_string(hide_password=False)
+        said = " ".join(hidden_in(str(error.orig), address).split())
         raise InputError(where, f"the database says: {said[:300]}") from error
     except UnicodeDecodeError as error:
         raise InputError(where, "the database holds text that is not UTF-8: its file was damaged") from error
+
+
+def vacuum(engine: Engine, where: str) -> None:
+    """Let nothing that was deleted stay in the files of the database; raises `InputError` where it refuses."""
+    connection = engine.raw_connection()
+    try:
+        with _refusing(engine, where):
+            if engine.dialect.name == "postgresql":
+                connection.driver_connection.autocommit = True  # type: ignore[union-attr]
+            cursor = connection.cursor()
+            for statement in _VACUUM[engine.dialect.name]:
+                cursor.execute(statement)
+            cursor.close()
+    finally:
+        connection.close()
+
+
+_VACUUM = {
+    "sqlite": ("VACUUM", "PRAGMA wal_checkpoint(TRUNCATE)"),
+    "postgresql": ("VACUUM FULL",),
+}
 
 
 def version_of(engine: Engine, where: str) -> str | None:

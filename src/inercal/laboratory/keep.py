@@ -11,6 +11,7 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select
 
+from inercal.addresses import without_secrets
 from inercal.errors import InputError
 from inercal.estimate.files import plain_objects, to_json
 from inercal.estimate.result import Estimate
@@ -60,7 +61,7 @@ def item_of(estimate: Estimate, given: str | None = None) -> Item | None:
             said.get("owner", ""),
             estimate.command,
         )
-    text = given if given is not None else said.get("instrument", "")
+    text = without_secrets(given if given is not None else said.get("instrument", ""))
     parts = [part.strip() for part in text.split(",")]
     if not parts[-1]:
         if given is not None:
@@ -264,7 +265,7 @@ def _files(
     rows, notes = [], []
     for source in {each.sha256: each for each in estimate.inputs}.values():
         path = copies.get(source.path) or _place(source.path)
-        place = source.path if "://" in source.path else str(path.absolute())
+        place = without_secrets(source.path if "://" in source.path else str(path.absolute()))
         try:
             size = path.stat().st_size
             if size > LARGE:

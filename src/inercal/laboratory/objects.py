@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from inercal._files import replacing
+from inercal.addresses import hidden_in
 from inercal.errors import InputError, MissingExtraError
 
 _PIECE = 1 << 22
@@ -35,8 +36,9 @@ class Objects:
         except ImportError as error:
             raise MissingExtraError(f"objects at {self.where.split('://')[0]}://", "s3") from error
         except ValueError as error:
+            said = hidden_in(str(error), self.where)
             raise InputError(
-                self.where, f"{error}, expected a folder or a URL such as s3://bucket/objects"
+                self.where, f"{said}, expected a folder or a URL such as s3://bucket/objects"
             ) from error
         return system, path.rstrip("/")
 
@@ -94,6 +96,19 @@ class Objects:
             file.writelines(pieces)
         with suppress(OSError):  # a file system without modes
             os.chmod(target, stat.S_IRUSR | stat.S_IRGRP | stat.S_IROTH)
+
+    def remove(self, sha256: str) -> None:
+        """Delete an object that holds what may not be kept; raises `InputError` where it cannot be deleted."""
+        try:
+            if self.local:
+                Path(self.place(sha256)).unlink(missing_ok=True)
+            else:
+                system, path = self._folder
+                system.rm_file(f"{path}/{sha256[:2]}/{sha256}")
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise InputError(self.place(sha256), f"cannot be deleted ({error.strerror or error})") from error
 
     def has(self, sha256: str, size: int) -> bool:
         """True if an object of that size is there."""

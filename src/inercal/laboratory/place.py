@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from inercal.addresses import shown_address
 from inercal.errors import InputError
 
 VARIABLE = "INERCAL_STORE"
@@ -15,11 +17,16 @@ VARIABLE = "INERCAL_STORE"
 
 @dataclass(frozen=True)
 class Place:
-    """A store as it was named, without passwords, and the URL of its database; ``folder`` where it is one."""
+    """A store as it may be ``shown``, without secrets, and the URL of its database; ``folder`` where it is one."""
 
     shown: str
-    url: str
+    url: str = field(repr=False)
     folder: Path | None
+
+    @property
+    def given(self) -> str:
+        """What `place_of` takes for the same place in another process: it may hold a secret, so it is shown nowhere."""
+        return self.url if self.folder is None else str(self.folder.absolute())
 
 
 def place_of(given: str | None, environment: Mapping[str, str] = os.environ) -> Place:
@@ -35,13 +42,10 @@ def place_of(given: str | None, environment: Mapping[str, str] = os.environ) -> 
     if not text.strip() or "\0" in text:
         raise InputError("--store", f"found {text!r}, expected a folder or the URL of a database")
     if "://" in text:
-        return Place(_without_password(text), text, None)
+        return Place(shown_address(text), text, None)
+    if re.match(r"[A-Za-z][\w+.-]+:", text) and "@" in text:
+        raise InputError(
+            "--store", "found an address without ://, expected one such as postgresql://host/database"
+        )
     folder = Path(text).expanduser()
     return Place(str(folder), f"sqlite:///{folder.absolute() / 'store.db'}", folder)
-
-
-def _without_password(url: str) -> str:
-    """A URL that may be shown."""
-    scheme, _, rest = url.partition("://")
-    user, at, host = rest.rpartition("@")
-    return f"{scheme}://{user.partition(':')[0]}{at}{host}"

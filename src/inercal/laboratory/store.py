@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sqlite3
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from sqlalchemy import Engine, insert, select
 
+from inercal.addresses import holds_secret
 from inercal.errors import InputError
 from inercal.laboratory.chain import digest_of, happened
 from inercal.laboratory.database import (
@@ -29,7 +30,7 @@ class Store:
     """An open store: its place, the engine of its database, and its objects."""
 
     place: Place
-    engine: Engine
+    engine: Engine = field(repr=False)
     objects: Objects
 
     @property
@@ -51,9 +52,16 @@ def make_store(given: str | None = None, objects: str | None = None) -> Store:
     Raises
     ------
     InputError
-        There is a store already, the folder cannot be made, or the place of objects is missing.
+        There is a store already, the folder cannot be made, or the place of objects is missing or holds a secret,
+        which would be kept with it.
     """
     place = place_of(given)
+    if objects is not None and holds_secret(objects):
+        raise InputError(
+            "--objects",
+            f"found a secret in {objects}, which the store would keep, expected an address without, and the secret in "
+            "the environment (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, FSSPEC_S3_KEY and FSSPEC_S3_SECRET)",
+        )
     if place.folder is None and objects is None:
         raise InputError("--objects", f"missing, expected the folder or URL for the objects of {place.shown}")
     if place.folder is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import insert, select
 
+from inercal.addresses import without_secrets
 from inercal.errors import InputError
 from inercal.laboratory.catalog import SHORT, find
 from inercal.laboratory.chain import digest_of, happened, now
@@ -21,7 +22,7 @@ def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, s
         No such results, they are one and the same, of different instruments, the first is superseded already or would
         supersede itself by way of others, or the reason is empty.
     """
-    old, new = find(store, identity), find(store, by)
+    old, new, reason = find(store, identity), find(store, by), without_secrets(reason)
     if not reason.strip():
         raise InputError("--reason", "found an empty text, expected why the result is superseded")
     if old == new:

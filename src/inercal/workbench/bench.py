@@ -16,6 +16,7 @@ import numpy as np
 
 from inercal._files import read_bytes, write_text
 from inercal.errors import InercalError, InputError
+from inercal.laboratory.place import VARIABLE
 from inercal.workbench.jobs import Job, Queue
 from inercal.workbench.measurements import MEASURED, Measurements
 from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions, put
@@ -54,7 +55,7 @@ class Bench:
     root: Path
     sessions: Sessions
     queue: Queue
-    store: str | None = None
+    store: str | None = field(default=None, repr=False)
     measurements: Measurements = field(default_factory=Measurements)
     _looked: OrderedDict[tuple[Any, ...], tuple[Looked, ...]] = field(default_factory=OrderedDict, repr=False)
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
@@ -186,7 +187,6 @@ class Bench:
         words = ["keep", self._result_of(job)]
         words += ["--report", os.path.relpath(job.report, job.where)] if job.report else []
         words += ["--instrument", instrument] if instrument else []
-        words += ["--store", self.store] if self.store else []
         return self.queue.add(job.session, job.where, words)
 
     @property
@@ -216,7 +216,6 @@ class Bench:
         ]
         words += ["--page", os.path.relpath(job.report, job.where)] if job.report else []
         words += ["--html", "{out}/certificate.html", "--out", "{out}/certificate.xml"]
-        words += ["--store", self.store] if self.store else []
         return self.queue.add(job.session, job.where, words)
 
     def convert(self, job: Job, tool: str) -> Job:
@@ -314,11 +313,12 @@ def open_bench(root: Path, store: str | None = None) -> Bench:
     """The bench of a work folder, which is made where it is not there; raises `InputError`."""
     if store is not None and "://" not in store:
         store = str(Path(store).expanduser().absolute())  # commands run in the folders of sessions
+    environment = {} if store is None else {VARIABLE: store}
     try:
         (root / "sessions").mkdir(parents=True, exist_ok=True)
         for part in root.glob(f"sessions/*/.*{PART}"):  # of uploads that a crash cut off
             part.unlink(missing_ok=True)
-        return Bench(root, Sessions(root / "sessions"), Queue(root / "jobs"), store)
+        return Bench(root, Sessions(root / "sessions"), Queue(root / "jobs", environment), store)
     except OSError as error:
         raise InputError(root, f"cannot be made a work folder ({error.strerror})") from error
 

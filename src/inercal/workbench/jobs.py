@@ -12,7 +12,7 @@ import shlex
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from inercal._files import read_bytes, write_text
+from inercal.addresses import shown_address
 from inercal.errors import InputError
 
 _ABOUT, _LAST = "job.json", 20_000
@@ -104,11 +105,16 @@ def _text(path: Path) -> str:
 
 
 class Queue:
-    """The jobs of a folder, of which one runs at a time, begun in the order in which they came."""
+    """The jobs of a folder, of which one runs at a time, begun in the order in which they came.
 
-    def __init__(self, root: Path) -> None:
+    ``environment`` holds variables for their commands beside those of this process: what is secret stands there and not
+    in arguments, which every user of the machine can read.
+    """
+
+    def __init__(self, root: Path, environment: Mapping[str, str] | None = None) -> None:
         root.mkdir(parents=True, exist_ok=True)
         self.root = root
+        self._environment = {**os.environ, **(environment or {})}
         self._changed = threading.Condition()
         self._process: subprocess.Popen[bytes] | None = None
         self._running: str | None = None
@@ -212,7 +218,7 @@ class Queue:
                 job = replace(job, state=State.RUNNING)
                 self._put(job)
                 try:
-                    process = _begun(job)
+                    process = _begun(job, self._environment)
                 except OSError as error:  # its folder has gone, or there is no room for another process
                     write_text(job.folder / "said", f"inercal: error: {error.filename}: {error.strerror}\n")
                     self._put(replace(job, state=State.REFUSED, code=2))
@@ -234,12 +240,13 @@ class Queue:
         return next((job for _, job in sorted(self._jobs.items()) if job.state is State.WAITING), None)
 
 
-def _begun(job: Job) -> subprocess.Popen[bytes]:
-    """The process of a job."""
+def _begun(job: Job, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    """The process of a job, with its variables."""
     with open(job.folder / "said", "wb") as said, open(job.folder / "printed", "wb") as printed:
         return subprocess.Popen(
             [sys.executable, "-m", "inercal.workbench.child", str(job.folder), *job.arguments],
             cwd=job.where,
+            env=environment,
             stdin=subprocess.PIPE,
             stdout=printed,
             stderr=said,
@@ -255,13 +262,24 @@ def _ended(job: Job) -> Job:
     return replace(job, state=State.DONE if code in (0, 1) else State.REFUSED, code=code)
 
 
+def _without_store(arguments: Iterable[str]) -> tuple[str, ...]:
+    """Arguments without the store, which 0.2.0 put there and the environment holds now, and without other secrets."""
+    kept, words = [], iter(arguments)
+    for word in words:
+        if word == "--store":
+            next(words, None)
+        else:
+            kept.append(shown_address(word))
+    return tuple(kept)
+
+
 def _found(folder: Path) -> Job | None:
     """The job of a folder, as the program that ended left it; None where it is none."""
     try:
         about = json.loads(read_bytes(folder / _ABOUT))
         state = State(about["state"])
         job = Job(
-            folder.name, folder, about["session"], tuple(about["arguments"]), Path(about["where"]), state,
+            folder.name, folder, about["session"], _without_store(about["arguments"]), Path(about["where"]), state,
             about["made"], about["code"],
         )  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
 from alembic import op
+from sqlalchemy import Connection, text
 
 _SAYS = "rows of this table are only added: a correction is a new row"
 
@@ -37,5 +41,27 @@ def append_only(*tables: str) -> None:
             op.execute(_ROWS.format(table=table))
             op.execute(_WHOLE.format(table=table))
         else:
-            for what in ("UPDATE", "DELETE"):
-                op.execute(_SQLITE.format(table=table, what=what, word=what.lower(), says=_SAYS))
+            for statement in _sqlite(table):
+                op.execute(statement)
+
+
+def _sqlite(table: str) -> Iterator[str]:
+    """The statements that make the triggers of a table of SQLite."""
+    for what in ("UPDATE", "DELETE"):
+        yield _SQLITE.format(table=table, what=what, word=what.lower(), says=_SAYS)
+
+
+@contextmanager
+def suspended(connection: Connection, tables: Sequence[str]) -> Iterator[None]:
+    """Let rows of the tables be changed within a transaction; without an error the triggers are back at its end."""
+    postgresql = connection.dialect.name == "postgresql"
+    for table in tables:
+        if postgresql:
+            connection.execute(text(f"ALTER TABLE {table} DISABLE TRIGGER USER"))
+        else:
+            for word in ("update", "delete"):
+                connection.execute(text(f"DROP TRIGGER {table}_no_{word}"))
+    yield
+    for table in tables:
+        for statement in [f"ALTER TABLE {table} ENABLE TRIGGER USER"] if postgresql else _sqlite(table):
+            connection.execute(text(statement))

@@ -11,6 +11,7 @@ from urllib.parse import quote, urlencode
 
 from nicegui import ui
 
+from inercal.addresses import shown_address
 from inercal.errors import InercalError
 from inercal.laboratory.catalog import SHORT
 from inercal.workbench.bench import Bench
@@ -33,7 +34,12 @@ def add(bench: Bench) -> None:
                 ui.label("The first result that is kept needs a store; make one with:").classes("quiet")
                 command(
                     shlex.join(
-                        ["inercal", "store", "init", *(["--store", bench.store] if bench.store else [])]
+                        [
+                            "inercal",
+                            "store",
+                            "init",
+                            *(["--store", shown_address(bench.store)] if bench.store else []),
+                        ]
                     )
                 )
                 return
@@ -82,7 +88,7 @@ async def _history(bench: Bench, serial: str) -> None:
     )
     frame.props["srcdoc"] = page
     words = ["inercal", "history", serial, "--report", "history.html"]
-    command(shlex.join([*words, *(["--store", bench.store] if bench.store else [])]))
+    command(shlex.join([*words, *(["--store", shown_address(bench.store)] if bench.store else [])]))
 
 
 def _kept(results: Sequence[Listed], certificates: Sequence[Mapping[str, Any]]) -> None:

@@ -1,0 +1,226 @@
+"""Secrets taken out of a store that inercal 0.2.0 or earlier wrote passwords into, with an event that says so.
+
+What held one is written anew with ``***`` in its place: results, pages and certificates among the objects, texts in
+rows, the address of the objects. The hash of the chain before, its old head, is the subject of the event `SCRUB`: one
+that was noted elsewhere is still found in the store.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from sqlalchemy import Connection, Text, select, update
+
+from inercal.addresses import holds_secret, without_login, without_secrets
+from inercal.errors import InputError
+from inercal.estimate.files import plain_objects
+from inercal.laboratory.chain import BEGIN, SCRUB, digest_of, happened, hash_of
+from inercal.laboratory.check import check, digests_of
+from inercal.laboratory.database import vacuum, writing
+from inercal.laboratory.migrations.append_only import suspended
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import Store
+from inercal.laboratory.tables import Base, Certificate, Event, Recording, Result, Setting
+
+_APPEND_ONLY = (
+    "recording",
+    "result",
+    "source",
+    "used",
+    "coefficient",
+    "supersession",
+    "event",
+    "certificate",
+    "certified",
+)
+
+
+_SMALL = 1 << 20
+"""Bytes from which on a file is taken for a recording, which holds no address."""
+
+
+@dataclass(frozen=True)
+class Scrubbed:
+    """What was written anew: subjects of events by their kind, objects, texts in rows; the SHA-256 of files that hold a
+    secret and stay, for results rest on them; the head of the chain before and now."""
+
+    subjects: Mapping[str, tuple[str, ...]]
+    objects: int
+    texts: int
+    files: tuple[str, ...]
+    before: str
+    head: str
+
+
+def scrub(store: Store) -> Scrubbed:
+    """Take the secrets of all addresses out of a store, and say so in its chain; nothing is done where there are none.
+
+    Raises `InputError` where the store is not as it was written, or its objects cannot be reached without the secret in
+    their address.
+    """
+    faults = check(store).faults
+    if faults:
+        raise InputError(store.where, f"{faults[0]}, expected a store as it was written")
+    place = _place_of_objects(store)
+    with writing(store.engine, store.where) as connection, suspended(connection, _APPEND_ONLY):
+        told = digests_of(connection)
+        replaced = dict(_replaced(connection, store.objects))
+        texts = _clean_rows(connection)
+        if place is not None:
+            connection.execute(update(Setting).where(Setting.key == "objects").values(value=place))
+            texts += 1
+        before, events = _clean_chain(connection)
+        texts += events
+        now = digests_of(connection)
+        subjects = {
+            kind: tuple(sorted(subject for subject in now[kind] if now[kind][subject] != told[kind][subject]))
+            for kind in now
+        }
+        for kind, changed in subjects.items():
+            for subject in changed:
+                happened(connection, f"{SCRUB} {kind}", subject, now[kind][subject])
+        if replaced or texts:
+            happened(connection, SCRUB, before, digest_of([sorted(replaced.items()), texts]))
+        loose, files = _others(connection, store.objects)
+        head = connection.execute(select(Event.hash).order_by(Event.number.desc())).scalars().first() or BEGIN
+    objects = store.objects if place is None else Objects(place)
+    for sha256 in {*replaced, *loose} - set(replaced.values()):
+        objects.remove(sha256)
+    if replaced or texts:
+        vacuum(store.engine, store.where)
+    return Scrubbed(subjects, len(replaced), texts, tuple(files), before, head)
+
+
+def _place_of_objects(store: Store) -> str | None:
+    """The address of the objects without its secret, None where it holds none; raises `InputError` out of reach."""
+    if not holds_secret(store.objects.where):
+        return None
+    place = without_login(store.objects.where)
+    try:
+        there = Objects(place).names()
+    except Exception as error:  # each file system has errors of its own
+        raise InputError(place, f"cannot be reached ({type(error).__name__}), {_ELSEWHERE}") from error
+    if there != store.objects.names():
+        raise InputError(place, f"holds other objects than with the secret in its address, {_ELSEWHERE}")
+    return place
+
+
+_ELSEWHERE = (
+    "expected the secret of the objects in the environment (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, "
+    "FSSPEC_S3_KEY and FSSPEC_S3_SECRET)"
+)
+
+
+def _replaced(connection: Connection, objects: Objects) -> Iterator[tuple[str, str]]:
+    """Objects with a secret, each with the one that takes its place, which rows point to then."""
+    for table, column, cleaned in (
+        (Result, "object", _result),
+        (Result, "report", _page),
+        (Certificate, "object", _certificate),
+        (Certificate, "page", _page),
+    ):
+        own = table.__table__.columns[column]
+        for sha256 in set(connection.execute(select(own).where(own.is_not(None))).scalars()):
+            content = objects.read(sha256)
+            clean = cleaned(content)
+            if clean != content:
+                new = objects.add(clean)
+                connection.execute(update(table).where(own == sha256).values({column: new}))
+                yield sha256, new
+
+
+def _result(content: bytes) -> bytes:
+    """The JSON of a result without secrets."""
+    data = json.loads(content)
+    clean = plain_objects(data)
+    if clean == data:
+        return content
+    return (json.dumps(clean, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _page(content: bytes) -> bytes:
+    """A page without secrets."""
+    return without_secrets(content.decode(errors="surrogateescape")).encode(errors="surrogateescape")
+
+
+def _certificate(content: bytes) -> bytes:
+    """A certificate without secrets, those in the files inside it among them."""
+    from lxml import etree
+
+    from inercal.laboratory.certificate.elements import DCC
+    from inercal.laboratory.certificate.parsing import tree_of
+
+    root, changed = tree_of(content, "certificate"), False
+    for element in root.iter(f"{{{DCC}}}*"):
+        old = element.text or ""
+        if element.tag == f"{{{DCC}}}dataBase64":
+            inner = base64.b64decode(old)
+            clean = _result(inner) if inner[:1] == b"{" else _page(inner)
+            new = base64.b64encode(clean).decode() if clean != inner else old
+        else:
+            new = without_secrets(old)
+        if new != old:
+            element.text, changed = new, True
+    if not changed:
+        return content
+    made: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return made + b"\n"
+
+
+def _clean_rows(connection: Connection) -> int:
+    """Write the texts in rows without secrets; how many there were."""
+    count = 0
+    for table in Base.metadata.sorted_tables:
+        key = table.primary_key.columns.values()
+        columns = [
+            column
+            for column in table.columns
+            if isinstance(column.type, Text) and column not in key and not column.foreign_keys
+        ]
+        if table.name in (Event.__tablename__, Setting.__tablename__) or not columns:
+            continue
+        for row in connection.execute(select(*key, *columns)).mappings():
+            clean = {
+                column.name: without_secrets(row[column.name])
+                for column in columns
+                if row[column.name] is not None and without_secrets(row[column.name]) != row[column.name]
+            }
+            if clean:
+                same = (column == row[column.name] for column in key)
+                connection.execute(update(table).where(*same).values(clean))
+                count += len(clean)
+    return count
+
+
+def _clean_chain(connection: Connection) -> tuple[str, int]:
+    """The old head of the chain, which is written anew from the first event on that holds a secret; how many do."""
+    previous, old, count = BEGIN, BEGIN, 0
+    for row in map(dict, connection.execute(select(Event).order_by(Event.number)).mappings().all()):
+        old = row["hash"]
+        clean = {**row, "subject": without_secrets(row["subject"]), "previous": previous}
+        clean["hash"] = previous = hash_of(clean)
+        count += clean["subject"] != row["subject"]
+        if clean != row:
+            connection.execute(update(Event).where(Event.number == row["number"]).values(clean))
+    return old, count
+
+
+def _others(connection: Connection, objects: Objects) -> tuple[list[str], list[str]]:
+    """Objects with a secret in them that were not replaced: those that no row points to, left by a command that was cut
+    short, and small files that results rest on."""
+    pointed = {
+        sha256
+        for column in (Result.object, Result.report, Certificate.object, Certificate.page)
+        for sha256 in connection.execute(select(column)).scalars()
+    }
+    query = select(Recording.sha256, Recording.bytes).where(Recording.place.is_(None))
+    sizes = {row.sha256: row.bytes for row in connection.execute(query)}
+    loose: list[str] = []
+    files: list[str] = []
+    for sha256 in sorted(objects.names() - pointed):
+        if sizes.get(sha256, 0) < _SMALL and _page(content := objects.read(sha256)) != content:
+            (files if sha256 in sizes else loose).append(sha256)
+    return loose, files
