@@ -49,7 +49,7 @@ def spoiled(store, tmp_path, monkeypatch):
 
 
 def spoil(store, tmp_path, monkeypatch):
-    """Write into a store, as 0.2.0 did, a password in results, a page, a certificate, texts of rows and an event; one is sound."""
+    """Write into a store, as 0.2.0 did, secrets in results, a page, a certificate, texts of rows and an event."""
     with monkeypatch.context() as old:
         secrets_of_old(old)
         sound = keep(store, result(1), ITEM, b"<p>page</p>").id
