@@ -61,6 +61,11 @@ def plain(where: object, text: str) -> str:
     return text
 
 
+def spelt(text: str) -> str:
+    """The text with what `plain` refuses spelt out, to be shown."""
+    return text.replace("\0", "\\x00").encode(errors="backslashreplace").decode()
+
+
 class RecordError(InputError):
     """A recording that cannot be read."""
 

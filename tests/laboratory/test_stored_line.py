@@ -217,9 +217,8 @@ def test_a_kept_file_that_another_names_by_its_absolute_path_is_read_where_it_li
         case "--set":
             line += ["--set", "estimator.prior=/lab/other.csv"]
         case "map":
-            column_map.write_text(
-                "[file.one]\npath = '/lab/other.csv'\n[file.one.columns.acc_x]\nfrom = 'a'\n"
-            )
+            part = "path = '/lab/other.csv'\n[file.one.columns.acc_x]\nfrom = 'a'\nunit = 'g'\n"
+            column_map.write_text(f"[file.one]\n{part}")
             line, changed = [*line[:1], *line[2:], "--map", "/lab/map.toml"], column_map
         case "runs":
             (laid.folder / table).write_text("file,role\n/lab/other.csv,run\n")

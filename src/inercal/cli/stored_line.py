@@ -69,11 +69,15 @@ class StoredLine:
     command: str
     given: Mapping[str, tuple[Any, ...]]
 
+    def use(self, name: str) -> Use:
+        """The use of one of its options."""
+        return _use(self.command, name)
+
     def words(self, laid: LaidOut) -> tuple[str, ...]:
         """Arguments of the command on files that are laid out; raises `InputError` where it would read others."""
         arguments, options = [], []
         for name, values in self.given.items():
-            use = _use(self.command, name)
+            use = self.use(name)
             if use == "dropped":
                 continue
             for value in values:
