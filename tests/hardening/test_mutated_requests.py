@@ -184,8 +184,8 @@ def test_a_spoiled_upload_is_looked_at_or_refused(answering, name, seeds):
 
 ODD = (
     "\0", "a\0b", "\ud800", "x\udfff", "\ud83d\ude00", "x" * 200_000, "", " ", "\n", "\x1b[2J\x7f", "\u202e", "--",
-    "--out=/x", "-x", "../../..", "/etc/passwd", "s3://a/b", "nan", "1e999", "{out}", "<script>", None, True, -1, 10**30,
-    1.5, [], ["\0"], {}, {"\ud800": "\0"}, [[["x"]]],
+    "--out=/x", "-x", "../../..", "/etc/passwd", "s3://a/b", "nan", "1e999", "{out}", "<script>", None, True, -1,
+    10**30, 1.5, [], ["\0"], {}, {"\ud800": "\0"}, [[["x"]]],
 )  # fmt: skip
 """Values in the place of a text."""
 
