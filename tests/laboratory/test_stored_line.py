@@ -227,6 +227,20 @@ def test_a_kept_file_that_another_names_by_its_absolute_path_is_read_where_it_li
     assert str(place) in changed.read_text() or f"--set=estimator.prior={place}" in words
 
 
+def test_whole_names_alone_are_replaced(laid):
+    """Paths that are parts of others, and of the places themselves."""
+    far = {
+        path: f"{laid.root}/absolute{path}"
+        for path in ("/a.csv", "/lab/a.csv", "/lab/a.csv.gz", "/x y/a.csv")
+    }
+    moved = LaidOut(laid.root, laid.folder, far).moved
+    for path, place in far.items():
+        for text in ("{}", "prior = '{}'", 'a=["{}"]', "{},run\r\n", 'estimator={{prior="{}"}}'):
+            assert moved(text.format(path)) == text.format(place)
+    for text in ("here/lab/a.csv", "/lab/a.csvs", "/lab/a.csv/b", "../a.csv", "/other/lab/a.csv", place):
+        assert moved(text) == text
+
+
 def test_names_that_begin_with_a_bracket_or_a_dash_stay_names(laid):
     """The parser takes a bracket for the beginning of a list."""
     bracket = '["/etc/passwd"]'

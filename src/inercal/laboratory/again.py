@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -37,9 +38,11 @@ class LaidOut:
 
     def moved(self, text: str) -> str:
         """A text in which files are named by their absolute paths, with those of their places."""
-        for path, place in sorted(self.places.items(), reverse=True):  # /log.csv.gz before /log.csv
-            text = text.replace(path, place) if path != place else text
-        return text
+        far = sorted((path for path, place in self.places.items() if path != place), key=len, reverse=True)
+        names = "|".join(map(re.escape, far))
+        between = r"\s\"'=,;:\[\](){}"
+        whole = rf"(?<![^{between}])({names})(?![^{between}])"
+        return re.sub(whole, lambda found: self.places[found[0]], text) if far else text
 
     def name_places(self, path: Path) -> None:
         """Let a file in ``folder`` that names others by their absolute paths, as a study may, name their places."""
