@@ -236,7 +236,7 @@ def with_a_job(folder):
     (job.folder / "result.json").write_text("{}")
 
 
-def begun(job):
+def begun(job, *_):
     """A process that is begun with the arguments of a job, and does nothing."""
     command = [sys.executable, "-S", "-E", "-c", "", str(job.folder), *job.arguments]
     return subprocess.Popen(command, cwd=job.where, stdin=subprocess.PIPE)

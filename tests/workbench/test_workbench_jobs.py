@@ -145,10 +145,10 @@ def test_an_argument_that_is_too_long_refuses_the_job_and_the_next_one_runs(queu
 def test_whatever_befalls_a_job_the_next_one_runs(queue, tmp_path, monkeypatch, error):
     begun = jobs._begun
 
-    def failing(job):
+    def failing(job, *more):
         if job.id == "00001":
             raise error
-        return begun(job)
+        return begun(job, *more)
 
     monkeypatch.setattr(jobs, "_begun", failing)
     first, second = queue.add("0001", tmp_path, LISTS), queue.add("0001", tmp_path, LISTS)
