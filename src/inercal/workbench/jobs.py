@@ -274,14 +274,11 @@ def _tell(job: Job) -> None:
 def _refused(job: Job, error: Exception) -> Job:
     """A job that cannot be begun, with the reason among its words."""
     why = str(error)
-    if isinstance(
-        error, OSError
-    ):  # its folder has gone, it is too long, there is no room for another process
+    if isinstance(error, OSError):  # its folder has gone, it is too long, no room for another process
         why = f"{error.filename or 'the command'}: {error.strerror or error}"
+    said = " ".join(spelt(why).split())
     with suppress(InercalError, OSError):
-        write_text(
-            job.folder / "said", f"inercal: error: {spelt(why)}, expected a command that can be begun\n"
-        )
+        write_text(job.folder / "said", f"inercal: error: {said}\n")
     return replace(job, state=State.REFUSED, code=2)
 
 
@@ -327,5 +324,5 @@ def _found(folder: Path) -> Job | None:
     if state is State.RUNNING:
         return _ended(job)
     if state is State.WAITING and [session, where, made, *words] != texts:
-        return _refused(job, ValueError("found characters that no command can have"))
+        return _refused(job, ValueError("found a text that no command can have, expected plain text"))
     return job
