@@ -51,6 +51,23 @@ class InputError(InercalError):
         return type(self), (self.where, self.message)
 
 
+def plain(where: object, text: str) -> str:
+    """The text, where a system can take it as a name, an argument or UTF-8.
+
+    Raises `InputError` for a NUL, or half of a surrogate pair.
+    """
+    odd = next((each for each in text if each == "\0" or "\ud800" <= each <= "\udfff"), None)
+    if odd is not None:
+        what = "a NUL" if odd == "\0" else f"half of a surrogate pair, {odd!r},"
+        raise InputError(where, f"found {what} at character {text.index(odd) + 1}, expected plain text")
+    return text
+
+
+def spelt(text: str) -> str:
+    """The text with what `plain` refuses spelt out, to be shown."""
+    return text.replace("\0", "\\x00").encode(errors="backslashreplace").decode()
+
+
 class RecordError(InputError):
     """A recording that cannot be read."""
 

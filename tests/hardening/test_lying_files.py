@@ -4,6 +4,8 @@ import gzip
 import os
 import signal
 import struct
+import subprocess
+import sys
 import threading
 import time
 import zipfile
@@ -388,6 +390,51 @@ def test_a_new_python_reads_the_same(tmp_path, monkeypatch):
     assert again.findings == wanted.findings
     with pytest.raises(RecordError, match="cannot be read as an HDF5 file"):
         read(put(tmp_path, "b.h5", "no such"))
+
+
+def test_a_new_python_imports_nothing_beside_a_recording(tmp_path, monkeypatch):
+    """A module of Python among foreign files lies in the working folder of whoever looks at them."""
+    put(tmp_path, "pickle.py", f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    started(monkeypatch, forked=False)
+    assert in_child(callable, put(tmp_path, "a.mat", "x")) is True
+    assert not (tmp_path / "ran").exists()
+
+
+_POOL = """
+from inercal import cli
+from inercal.estimate.executors import Processes
+
+def run(arguments):
+    print(sorted(found for _, found in Processes(1).map(len, [range(2), range(3)])))
+    return 0
+
+if __name__ == "__main__":
+    cli.run = run
+    cli.main()
+"""
+"""A program that begins as a command does, and makes a pool."""
+
+
+def test_a_pool_imports_nothing_beside_a_recording(tmp_path):
+    """As a pool of a command does, begun in a folder of foreign files."""
+    (tmp_path / "foreign").mkdir()
+    for name in ("multiprocessing", "pickle", "signal"):
+        put(tmp_path / "foreign", f"{name}.py", f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    environment = {name: text for name, text in os.environ.items() if not name.startswith("PYTHON")}
+    command = [sys.executable, str(put(tmp_path, "pool.py", _POOL))]
+    done = subprocess.run(
+        command,
+        cwd=tmp_path / "foreign",
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout == "[2, 3]\n", done.stderr
+    assert not (tmp_path / "ran").exists()
 
 
 def test_eight_bytes_less_in_a_mat_file(tmp_path):

@@ -1,7 +1,10 @@
 """REST of the workbench with spoiled bodies, names and files: an answer, or one sentence; nothing lands elsewhere."""
 
 import asyncio
+import itertools
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -16,16 +19,18 @@ pytest.importorskip("nicegui")
 
 import httpx
 
+from inercal.workbench.jobs import State
 from inercal.workbench.rest import rest_of
 
 
 class Answering:
     """The REST of a bench whose queue runs nothing, and the folder around it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, at_work=False):
         self.folder = folder
         self.bench = open_bench(folder / "work", str(folder / "store"))
-        self.bench.close()  # jobs are taken in, none is begun
+        if not at_work:
+            self.bench.close()  # jobs are taken in, none is begun
         self.transport = httpx.ASGITransport(rest_of(self.bench))
         self.around = self.outside()
 
@@ -175,3 +180,141 @@ def test_a_spoiled_upload_is_looked_at_or_refused(answering, name, seeds):
         except InercalError as error:
             said = str(error)
         assert "\n" not in said
+
+
+ODD = (
+    "\0", "a\0b", "\ud800", "x\udfff", "\ud83d\ude00", "x" * 200_000, "", " ", "\n", "\x1b[2J\x7f", "\u202e", "--",
+    "--out=/x", "-x", "../../..", "/etc/passwd", "s3://a/b", "nan", "1e999", "{out}", "<script>", None, True, -1,
+    10**30, 1.5, [], ["\0"], {}, {"\ud800": "\0"}, [[["x"]]],
+)  # fmt: skip
+"""Values in the place of a text."""
+
+WITH_BODY = (
+    ("POST", "/sessions", {"title": "a test"}),
+    ("POST", "/sessions", {"title": "a test", "example": None}),
+    ("POST", "/sessions", {"example": "no such"}),
+    ("POST", "/sessions/0001/study", {"kind": "imu", "rate": "100 Hz"}),
+    ("POST", "/sessions/0001/kind", {"kind": "imu"}),
+    ("POST", "/sessions/0001/design", {"settings": ["a.b=1", "c=2"]}),
+    (
+        "POST",
+        "/sessions/0002/live",
+        {"source": "replay:log.csv", "record": "a.csv", "to": ["text:x"], "every": "1 s"},
+    ),
+    ("POST", "/plans", {"kind": "no such"}),
+    ("POST", "/jobs/00001/keep", {"instrument": "A, B, 1"}),
+    ("POST", "/jobs/00001/convert", {"tool": "kalibr"}),
+    ("POST", "/jobs/00001/compare", {"earlier": "00001"}),
+    ("POST", "/jobs/00001/certificate", {"number": "T-1"}),
+    ("PUT", "/lab", "[laboratory]"),
+)
+"""Routes that take a body, each with a sound one."""
+
+
+def mutated(rng, body):
+    """A body with odd values in the place of one or two of its own, or of the whole."""
+    value = ODD[rng.integers(len(ODD))]
+    match body:
+        case dict() if rng.random() < 0.95:
+            key = [*body, "more"][rng.integers(len(body) + 1)]
+            inner = body.get(key)
+            return {
+                **body,
+                key: mutated(rng, inner) if isinstance(inner, list) and rng.random() < 0.7 else value,
+            }
+        case list() if body:
+            return [*body[:1], value, *body[1:]]
+    return value
+
+
+def with_a_job(folder):
+    """The folder with a session that plans a test, one without a recording, and a job that has left a result."""
+    found = Answering(folder)
+    assert found.ask("POST", "/plans", json={"kind": "turntable"}).status_code == 201
+    assert found.ask("POST", "/plans", json={"kind": "aoa"}).status_code == 201
+    job = found.bench.queue.add("0001", folder / "work" / "sessions" / "0001", ["calibrate", "imu"])
+    (job.folder / "result.json").write_text("{}")
+
+
+def begun(job, *_):
+    """A process that is begun with the arguments of a job, and does nothing."""
+    command = [sys.executable, "-S", "-E", "-c", "", str(job.folder), *job.arguments]
+    return subprocess.Popen(command, cwd=job.where, stdin=subprocess.PIPE)
+
+
+def answers(answering):
+    """Look whether the queue lives, and jobs and sessions are told."""
+    assert answering.bench.queue._thread.is_alive()
+    for path in ("/jobs", "/sessions"):
+        answer = answering.ask("GET", path)
+        assert answer.status_code == 200
+        assert answer.json()
+
+
+@pytest.mark.parametrize(
+    "count", [150, pytest.param(2000, marks=pytest.mark.campaign)], ids=["short", "rest"]
+)
+def test_no_body_ends_the_queue(count, tmp_path, monkeypatch):
+    """Each is answered, jobs are begun or refused, and all is told, also after a restart on the same folder."""
+    with_a_job(tmp_path)
+    monkeypatch.setattr("inercal.workbench.jobs._begun", begun)
+    answering, rng = Answering(tmp_path, at_work=True), np.random.default_rng(14)
+    statuses = set()
+    try:
+        for method, path, body in itertools.islice(itertools.cycle(WITH_BODY), count):
+            sent = json.dumps(mutated(rng, body)).encode()
+            answer = answering.ask(method, path, content=sent, headers={"content-type": "application/json"})
+            statuses.add(answer.status_code)
+        answers(answering)
+        last = answering.ask("POST", "/validation").json()["job"]
+        assert (
+            answering.bench.queue.wait(last, 60.0).state is State.INTERRUPTED
+        )  # begun, and it left no exit code
+    finally:
+        answering.bench.close()
+    assert {201, 202, 422} <= statuses
+    again = Answering(tmp_path, at_work=True)
+    try:
+        answers(again)
+    finally:
+        again.bench.close()
+
+
+def test_every_route_with_a_body_is_among_them(answering):
+    paths = rest_of(answering.bench).openapi()["paths"]
+    there = {
+        (method.upper(), path)
+        for path, methods in paths.items()
+        for method, route in methods.items()
+        if "requestBody" in route
+    }
+    numbers = ("0001", "0002", "00001")
+    tried = {
+        (method, "/".join("{number}" if part in numbers else part for part in path.split("/")))
+        for method, path, _ in WITH_BODY
+    }
+    assert there == tried
+
+
+@pytest.mark.parametrize("odd", ["\0", "\ud800"])
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("POST", "/sessions", {"title": "{}"}),
+        ("POST", "/sessions/0001/design", {"settings": ["a=1", "{}"]}),
+        ("POST", "/jobs/00001/keep", {"instrument": "A, B, {}"}),
+        ("POST", "/jobs/00001/certificate", {"number": "{}"}),
+        ("POST", "/sessions/0002/live", {"source": "udp://here:5/{}"}),
+        ("POST", "/sessions/0002/live", {"source": "udp://127.0.0.1:5", "to": ["text:{}"]}),
+        ("POST", "/sessions/0001/study", {"rate": "{} Hz"}),
+        ("PUT", "/lab", "# {}"),
+    ],
+)
+def test_a_text_that_is_none_is_refused_at_the_door(method, path, body, odd, tmp_path):
+    with_a_job(tmp_path)
+    answering = Answering(tmp_path)
+    before = [answering.ask("GET", each).json() for each in ("/jobs", "/sessions")]
+    sent = json.dumps(body).replace("{}", json.dumps(odd)[1:-1]).encode()
+    answer = answering.ask(method, path, content=sent, headers={"content-type": "application/json"})
+    assert answer.status_code == 422, answer.text
+    assert [answering.ask("GET", each).json() for each in ("/jobs", "/sessions")] == before

@@ -73,4 +73,9 @@ def test_an_address_in_each_place_of_each_command(tmp_path, capsys, monkeypatch)
 
 @pytest.mark.campaign
 def test_each_address_in_each_place_of_each_command(tmp_path, capsys, monkeypatch):
-    check([(line, address) for line in lines(joined=True) for address in ADDRESSES], tmp_path, capsys, monkeypatch)
+    check(
+        [(line, address) for line in lines(joined=True) for address in ADDRESSES],
+        tmp_path,
+        capsys,
+        monkeypatch,
+    )

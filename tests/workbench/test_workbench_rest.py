@@ -150,3 +150,27 @@ def test_programs_find_a_description(bench):
     assert status == 200
     assert found["paths"]["/sessions/{number}/jobs"]["post"]["description"]
     assert "http" not in json.dumps(found.get("servers", []))
+
+
+@pytest.mark.slow
+def test_a_folder_that_0_2_0_spoiled_is_served(tmp_path):
+    """A job and a session with texts that are none, as 0.2.0 took in: pages and lists are there, and jobs run."""
+    for folder, name, about in (
+        ("sessions/0001", "session.json", {"title": "odd \ud800\0", "kind": "imu", "made": "2026-11-26"}),
+        ("jobs/00001", "job.json", {"arguments": ["keep", "x", "--instrument", "\0"], "state": "waiting"}),
+        ("jobs/00002", "job.json", {"arguments": ["calibrate", "imu", "\ud800"], "state": "done"}),
+    ):
+        (tmp_path / "work" / folder).mkdir(parents=True)
+        if name == "job.json":
+            about |= {"session": "0001", "where": str(tmp_path / "work"), "made": "2026-11-26", "code": None}
+        (tmp_path / "work" / folder / name).write_text(json.dumps(about))
+    with served(tmp_path / "work") as bench:
+        for path in ("/", "/sessions/0001/recording", "/sessions/0001/run", "/validation"):
+            assert bench.ask(path)[0] == 200
+        assert [each["title"] for each in bench.ask("/api/v1/sessions")[1]] == ["odd \\ud800\\x00"]
+        assert [each["state"] for each in bench.ask("/api/v1/jobs")[1]] == ["done", "refused"]
+        assert bench.ask("/api/v1/jobs/00001/again", b"")[0] == 422
+        assert bench.ask("/api/v1/sessions", {"title": "\0"})[0] == 422
+        session = bench.ask("/api/v1/sessions", {"example": "ferraris-si"})[1]["session"]
+        job = bench.ask(f"/api/v1/sessions/{session}/jobs", b"")[1]
+        assert bench.ended(job["job"])["state"] == "done"

@@ -1,6 +1,7 @@
 """Sessions: files land in their folder under a harmless name, whole or not at all; TOML becomes map or study."""
 
 import asyncio
+import json
 
 import pytest
 from hypothesis import given
@@ -127,3 +128,31 @@ def test_a_store_is_the_same_from_every_folder(tmp_path, monkeypatch):
         bench = open_bench(tmp_path / "work", named)
         bench.close()
         assert bench.store == expected
+
+
+@pytest.mark.parametrize("title", ["\0", "a\ud800", "\udfff"])
+def test_a_title_that_is_no_text_is_refused_and_one_of_an_earlier_workbench_is_spelt_out(sessions, title):
+    with pytest.raises(InputError, match="title: found"):
+        sessions.begin(title)
+    assert [*sessions] == []
+    folder = sessions.begin("sound").folder
+    (folder / "session.json").write_text(json.dumps({"title": title, "kind": "imu", "made": "2026"}))
+    (found,) = sessions
+    assert found.title.encode().startswith((b"\\x00", b"a\\ud800", b"\\udfff"))
+
+
+@pytest.mark.parametrize("spoiled", [{"kind": "other"}, {"kind": None}, {"made": ["x"], "kind": []}])
+def test_a_session_that_says_no_kind_is_left_out(sessions, spoiled):
+    sessions.begin("sound")
+    about = {"title": "x", "kind": "imu", "made": "2026", **spoiled}
+    (sessions.begin("spoiled").folder / "session.json").write_text(json.dumps(about))
+    (sessions.begin("deep").folder / "session.json").write_text("[" * 100_000)
+    assert [each.title for each in sessions] == ["sound"]
+
+
+@pytest.mark.parametrize("text", ["x = '\0'", "x = '\ud800'"])
+def test_a_text_of_a_study_that_is_none_is_refused(sessions, text):
+    session = sessions.begin("test")
+    with pytest.raises(InputError, match=r"study.toml: found .* expected plain text"):
+        module.put(session, STUDY, text)
+    assert session.study is None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,6 +12,9 @@ from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit
 from inercal.errors import InercalError, InputError
+
+if TYPE_CHECKING:
+    import subprocess
 
 Identity = Annotated[
     str, Parameter(help="The result, by the first digits of its identity (`inercal results`).")
@@ -188,27 +191,31 @@ def rerun(
 ) -> int:
     """Make a kept result once more, and set the new one beside it."""
     import json
-    import subprocess
-    import sys
     import tempfile
 
+    from inercal.cli.stored_line import stored_line
     from inercal.estimate.files import from_json
     from inercal.estimate.result import without_coefficients
     from inercal.estimate.rounding import rounded
-    from inercal.laboratory.again import beside, restored, verdict
+    from inercal.laboratory.again import beside, laid_out, verdict
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown
     from inercal.laboratory.store import open_store
 
     opened = open_store(store)
     found = shown(opened, identity)
-    with tempfile.TemporaryDirectory(prefix="inercal-") as folder, working(output) as progress:
-        again = restored(opened, found, Path(folder))
-        progress(f"inercal {' '.join(again.arguments)}")
-        command = [sys.executable, "-m", "inercal", *again.arguments]
-        ended = subprocess.run(command, cwd=again.folder, capture_output=True, text=True, check=False)
+    short = found.listed.id[:SHORT]
+    try:
+        line = stored_line(found.estimate.provenance.get("arguments", ()))
+        with tempfile.TemporaryDirectory(prefix="inercal-") as folder, working(output) as progress:
+            laid = laid_out(opened, found, Path(folder))
+            arguments = line.words(laid)
+            progress(f"inercal {' '.join(arguments)}")
+            ended = _made_again(arguments, laid.folder)
+    except InputError as error:
+        raise InputError(f"{short}: {error.where}", error.message) from error
     if ended.returncode not in (0, EXIT_BAD_VERDICT):
-        raise InercalError(f"{found.listed.id[:SHORT]} made once more: {ended.stderr.strip()[-600:]}")
+        raise InercalError(f"{short} made once more: {ended.stderr.strip()[-600:]}")
     new = from_json(json.loads(ended.stdout))
     rows = beside(found.estimate, new)
     sound, words = verdict(found.estimate, new)
@@ -220,6 +227,20 @@ def rerun(
     data = {"id": found.listed.id, "sound": sound, "coefficients": [vars(row) for row in rows]}
     emit(without_coefficients("rerun", words, data), text, output)
     return 0 if sound else EXIT_BAD_VERDICT
+
+
+def _made_again(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """The command in a process that has no store, and imports nothing from the folder, whose files are anybody's."""
+    import os
+    import subprocess
+    import sys
+
+    own = {name: text for name, text in os.environ.items() if not name.startswith("INERCAL_")}
+    own["PYTHONPATH"] = os.pathsep.join(os.path.abspath(each) for each in sys.path if each)
+    command = [sys.executable, "-P", "-m", "inercal", *arguments]
+    return subprocess.run(
+        command, cwd=folder, env=own, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
 
 
 def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:

@@ -368,11 +368,11 @@ def call(arguments: list[str]) -> int | None:
     try:
         code: int | None = root(arguments)
     except CycloptsError as error:
-        raise UsageError(_refused(root, error)) from error
+        raise UsageError(refused(root, error)) from error
     return code
 
 
-def _refused(root: App, error: CycloptsError) -> str:
+def refused(root: App, error: CycloptsError) -> str:
     """The refusal of a command line, in a sentence."""
     from inercal.cli.refusals import refusal
 

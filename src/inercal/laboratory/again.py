@@ -1,54 +1,81 @@
-"""A kept result made once more: its files and command line restored, and the new result set beside the old."""
+"""A kept result made once more: its files laid out, and the new result set beside the old."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from inercal.errors import InputError
+from inercal._files import read_bytes, write_bytes
+from inercal.errors import InputError, plain
 from inercal.estimate.result import Estimate
-from inercal.laboratory.catalog import SHORT, Shown
+from inercal.laboratory.catalog import Shown
 from inercal.laboratory.store import Store
-
-_FLAGS = ("--keep", "--json", "--quiet")
-_LEFT_OUT = ("--store", "--instrument", "--checkpoint")
-_WRITTEN = ("--out", "--report")
 
 Same = Literal["equal", "within u", "changed", "missing", "new"]
 
 
 @dataclass(frozen=True)
-class Restored:
-    """Arguments of the command, and the folder to run it in."""
+class LaidOut:
+    """The files of a result below ``root``, and ``folder`` there, which stands for the one its command ran in.
 
-    arguments: tuple[str, ...]
-    folder: Path
-
-
-def restored(store: Store, shown: Shown, folder: Path) -> Restored:
-    """Lay the files of a result out below ``folder`` (empty) as they lay when it was made.
-
-    What the command would write goes to ``folder`` too. Raises `InputError` where a file was kept by reference and is
-    gone or changed, or the command line is not known, as of a result made in Python.
+    ``places`` has each file by its path in the result, normalised: that path itself, or where an absolute one lies now.
     """
-    arguments = [str(each) for each in shown.estimate.provenance.get("arguments", ())]
-    if not arguments:
-        raise InputError(
-            shown.listed.id[:SHORT],
-            "its command line is not known (it was made in Python, or by an older inercal), expected one of a command",
-        )
-    work = folder / "root" / Path(*["d"] * max(map(_upward, (path for path, _, _ in shown.files)), default=0))
-    work.mkdir(parents=True)
+
+    root: Path
+    folder: Path
+    places: Mapping[str, str]
+
+    def place(self, path: str) -> str:
+        """The path of a file in ``folder``; raises `InputError` for one that was not kept with the result."""
+        found = self.places.get(os.path.normpath(path))
+        if found is None:
+            raise InputError(path, "is not among the files kept with the result, expected one of them")
+        return found
+
+    def moved(self, text: str) -> str:
+        """A text in which files are named by their absolute paths, with those of their places."""
+        far = sorted((path for path, place in self.places.items() if path != place), key=len, reverse=True)
+        names = "|".join(map(re.escape, far))
+        between = r"\s\"'=,;:\[\](){}"
+        whole = rf"(?<![^{between}])({names})(?![^{between}])"
+        return re.sub(whole, lambda found: self.places[found[0]], text) if far else text
+
+    def name_places(self, path: Path) -> None:
+        """Let a file in ``folder`` that names others by their absolute paths, as a study may, name their places."""
+        before = read_bytes(self.folder / path).decode(errors="surrogateescape")
+        after = self.moved(before)
+        if after != before:
+            write_bytes(self.folder / path, after.encode(errors="surrogateescape"))
+
+    def check(self, path: Path) -> None:
+        """Refuse a file that a study, a map or a table names and that lies elsewhere; raises `InputError`."""
+        if not Path(os.path.realpath(self.folder / path)).is_relative_to(self.root):
+            raise InputError(path, "lies outside the files kept with the result, expected one of them")
+
+
+def laid_out(store: Store, shown: Shown, root: Path) -> LaidOut:
+    """Lay the files of a result out below ``root`` (empty) as they lay when it was made.
+
+    Raises `InputError` where a file was kept by reference and is gone or changed, or has a path that none can have.
+    """
+    root = Path(os.path.realpath(root))
+    folder = root / "root" / Path(*["d"] * max(map(_upward, (path for path, _, _ in shown.files)), default=0))
+    folder.mkdir(parents=True)
     places = {}
-    for path, sha256, place in shown.files:
-        target = _below(folder / "absolute", path) if _absolute(path) else Path(os.path.normpath(work / path))
+    for path, sha256, kept_at in shown.files:
+        plain("a file of the result", path)
+        absolute = _absolute(path)
+        target = _below(root / "absolute", path) if absolute else Path(os.path.normpath(folder / path))
+        if not target.is_relative_to(root):
+            raise InputError(path, "leads elsewhere, expected the path of a file")
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(_bytes(store, path, sha256, place))
-        places[path] = str(target) if _absolute(path) else path
-    return Restored(tuple(_arguments(arguments, places, folder)), work)
+        target.write_bytes(_bytes(store, path, sha256, kept_at))
+        places[os.path.normpath(path)] = str(target) if absolute else os.path.normpath(path)
+    return LaidOut(root, folder, places)
 
 
 def _upward(path: str) -> int:
@@ -75,7 +102,7 @@ def _bytes(store: Store, path: str, sha256: str, place: str | None) -> bytes:
     import hashlib
 
     try:
-        data = Path(place).read_bytes()
+        data = read_bytes(place)
     except OSError as error:
         raise InputError(
             place, f"cannot be read ({error.strerror}), expected {path}, kept by reference"
@@ -83,33 +110,6 @@ def _bytes(store: Store, path: str, sha256: str, place: str | None) -> bytes:
     if hashlib.sha256(data).hexdigest() != sha256:
         raise InputError(place, f"was changed, expected {path} as it was, kept by reference")
     return data
-
-
-def _arguments(given: Sequence[str], places: Mapping[str, str], folder: Path) -> list[str]:
-    """The command line, its files where they are now, its outputs below ``folder``, and what a rerun needs."""
-    found: list[str] = []
-    words = iter(given)
-    for word in words:
-        option, equals, value = word.partition("=") if word.startswith("--") else (word, "", "")
-        if option in _FLAGS:
-            continue
-        if option in (*_LEFT_OUT, *_WRITTEN):
-            value = value if equals else next(words, "")
-            if option in _WRITTEN:
-                found += [option, str(folder / f"{option[2:]}{Path(value).suffix}")]
-        elif equals:
-            found.append(f"{option}={_where(value, places)}")
-        else:
-            found.append(_where(word, places))
-    return [*found, "--json", "--quiet"]
-
-
-def _where(word: str, places: Mapping[str, str]) -> str:
-    """A word, or the place of the file that it names."""
-    for path, place in places.items():
-        if os.path.normpath(word) == os.path.normpath(path):
-            return place if place != path else word
-    return word
 
 
 @dataclass(frozen=True)

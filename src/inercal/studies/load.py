@@ -127,6 +127,15 @@ def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Pa
     return (path, *(path.parent / name for key, name in named.items() if key.split(".")[0] != unread))
 
 
+def files_named(kind: str, path: Path, overrides: Iterable[str], unread: str = "") -> tuple[Path, ...]:
+    """The study, and the files that it names with its overrides, as `files_of`, none of them read.
+
+    Raises `StudyError` where the study itself cannot be read.
+    """
+    command = kind if kind in ("selfcal", "aoa") else f"calibrate {kind}"
+    return files_of(path, _read(path, overrides, command), unread)
+
+
 def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Dotted keys and values of all texts in a table, in their order; however deep it is nested."""
     left = list(table.items())[::-1]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal._files import read_bytes, write_text
-from inercal.errors import InercalError, InputError
+from inercal.errors import InercalError, InputError, plain, spelt
 from inercal.laboratory.place import VARIABLE
 from inercal.workbench.jobs import Job, Queue
 from inercal.workbench.measurements import MEASURED, Measurements
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 VALIDATION = "validation"
 """The jobs of the validation, which are of no session."""
+
+_LONGEST = 900
+"""Characters of the words of an error."""
 
 _HELD = 2
 """Recordings that are held in memory."""
@@ -95,6 +98,7 @@ class Bench:
         """
         from inercal.face.beginning import begun, kind_of_record
 
+        plain("rate", rate or "")
         names = session.recordings
         known = kind_of_record(names) if kind is None else kind
         stays = session.map is not None and session.study is None
@@ -198,6 +202,7 @@ class Bench:
         """Write what the laboratory states; raises `InputError` where it is not so that a certificate can say it."""
         from inercal.laboratory.certificate.lab import read_lab
 
+        plain("lab.toml", text)
         with tempfile.TemporaryDirectory(dir=self.root) as folder:
             trial = Path(folder) / self.lab.name
             write_text(trial, text)
@@ -263,6 +268,7 @@ class Bench:
         from inercal.laboratory.store import open_store
 
         store = open_store(self.store)
+        plain("instrument", serial)
         return results(store, serial), certificates(store, serial)
 
     def certificate(self, number: str, page: bool = False) -> bytes:
@@ -325,9 +331,12 @@ def open_bench(root: Path, store: str | None = None) -> Bench:
 
 def said_of(error: BaseException) -> str:
     """The words of an error for a page."""
+    words = " ".join(spelt(str(error)).split())
+    if len(words) > _LONGEST:  # the beginning says where, the end what was expected
+        words = f"{words[: 2 * _LONGEST // 3]} ... {words[-_LONGEST // 3 :]}"
     if isinstance(error, InercalError):
-        return str(error)
-    return f"unexpected {type(error).__name__} ({error}), a fault of inercal's own: please report it"
+        return words
+    return f"unexpected {type(error).__name__} ({words}), a fault of inercal's own: please report it"
 
 
 KINDS: Mapping[str, str] = {

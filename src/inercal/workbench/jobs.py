@@ -17,12 +17,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from inercal._files import read_bytes, write_text
 from inercal.addresses import shown_address
-from inercal.errors import InputError
+from inercal.errors import InercalError, InputError, plain, spelt
 
 _ABOUT, _LAST = "job.json", 20_000
 _PATIENCE = 5.0
@@ -120,8 +121,9 @@ class Queue:
         self._running: str | None = None
         self._closed = False
         self._jobs = {job.id: job for job in map(_found, sorted(root.iterdir())) if job is not None}
-        for job in self._jobs.values():
-            self._put(job)
+        self._stored = frozenset(self._jobs)  # by anybody who can write here: not to be run unseen
+        for job in [*self._jobs.values()]:
+            self._put(self._seen(job))
         self._thread = threading.Thread(target=self._work, name="jobs", daemon=True)
         self._thread.start()
 
@@ -144,19 +146,24 @@ class Queue:
     def add(self, session: str, where: Path, arguments: Sequence[str]) -> Job:
         """A new job at the end of the queue; ``{out}`` in its arguments is its own folder, as seen from ``where``."""
         with self._changed:
-            number = max((int(each) for each in self._jobs), default=0) + 1
-            folder = self.folder_of(number)
+            for before, word in pairwise(("the command", *arguments)):
+                plain(before if before.startswith("--") else "the command", word)
+            numbers = (int(each.name) for each in self.root.iterdir() if _is_number(each.name))
+            folder = self.folder_of(max(numbers, default=0) + 1)
             folder.mkdir()
             words = tuple(word.replace("{out}", os.path.relpath(folder, where)) for word in arguments)
             made = datetime.now(UTC).isoformat(timespec="seconds")
             job = Job(folder.name, folder, session, words, where, State.WAITING, made)
-            self._put(job)
+            _tell(job)
+            self._jobs[job.id] = job
             self._changed.notify_all()
             return job
 
     def again(self, number: str) -> Job:
-        """The same command as a new job."""
+        """The same command as a new job; raises `InputError` where a workbench before this one left another kind."""
         old = self.get(number)
+        if number in self._stored:
+            self._check(old)
         own = os.path.relpath(old.folder, old.where)
         return self.add(old.session, old.where, [word.replace(own, "{out}") for word in old.arguments])
 
@@ -194,57 +201,98 @@ class Queue:
             process.kill()
         self._thread.join()
 
+    def _check(self, job: Job) -> None:
+        """Refuse a job that was found and is not to be run; raises `InputError`."""
+        from inercal.workbench.stored_jobs import check_stored
+
+        check_stored(job.arguments, job.where, self.root.parent, job.folder)
+
+    def _seen(self, job: Job) -> Job:
+        """A job that was found, refused where it waits and is not to be run."""
+        try:
+            if job.state is State.WAITING:
+                self._check(job)
+        except (InercalError, OSError, ValueError) as error:
+            return _refused(job, error)
+        return job
+
     def _put(self, job: Job) -> None:
-        """Keep what a job is, in memory and on the disk."""
+        """Keep what has become of a job, in memory and, where there is room, on the disk."""
         self._jobs[job.id] = job
-        about = {
-            "session": job.session,
-            "arguments": job.arguments,
-            "where": str(job.where),
-            "state": job.state.value,
-            "made": job.made,
-            "code": job.code,
-        }
-        write_text(job.folder / _ABOUT, json.dumps(about) + "\n")
+        with suppress(InercalError, OSError):
+            _tell(job)
 
     def _work(self) -> None:
-        """Run the jobs that wait, one by one."""
+        """Run the jobs that wait, one by one; whatever befalls one, the next is begun."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._closed or self._next() is not None)
                 job = self._next()
                 if self._closed or job is None:
                     return
-                job = replace(job, state=State.RUNNING)
-                self._put(job)
-                try:
-                    process = _begun(job, self._environment)
-                except OSError as error:  # its folder has gone, or there is no room for another process
-                    write_text(job.folder / "said", f"inercal: error: {error.filename}: {error.strerror}\n")
-                    self._put(replace(job, state=State.REFUSED, code=2))
+            try:
+                self._run(job)
+            except Exception as error:  # of a process, which may be refused for many reasons
+                with self._changed:
+                    if self._process is not None:
+                        self._process.kill()
+                    self._process, self._running = None, None
+                    self._put(_refused(job, error))
                     self._changed.notify_all()
-                    continue
-                self._process, self._running = process, job.id
-            process.wait()
-            if process.stdin is not None:
-                process.stdin.close()
-            with self._changed:
-                self._process, self._running = None, None
-                job = self._jobs[job.id]
-                if job.state is State.RUNNING:
-                    self._put(_ended(job))
-                self._changed.notify_all()
+
+    def _run(self, job: Job) -> None:
+        """Run a job to its end; raises what the system has against its process."""
+        with self._changed:
+            if self._jobs[job.id].state is not State.WAITING:  # cancelled meanwhile
+                return
+            job = replace(job, state=State.RUNNING)
+            self._put(job)
+            process = _begun(job, self._environment)
+            self._process, self._running = process, job.id
+        process.wait()
+        if process.stdin is not None:
+            process.stdin.close()
+        with self._changed:
+            self._process, self._running = None, None
+            job = self._jobs[job.id]
+            if job.state is State.RUNNING:
+                self._put(_ended(job))
+            self._changed.notify_all()
 
     def _next(self) -> Job | None:
         """The job that has waited longest."""
         return next((job for _, job in sorted(self._jobs.items()) if job.state is State.WAITING), None)
 
 
+def _tell(job: Job) -> None:
+    """Write what a job is; raises `InputError`."""
+    about = {
+        "session": job.session,
+        "arguments": job.arguments,
+        "where": str(job.where),
+        "state": job.state.value,
+        "made": job.made,
+        "code": job.code,
+    }
+    write_text(job.folder / _ABOUT, json.dumps(about) + "\n")
+
+
+def _refused(job: Job, error: Exception) -> Job:
+    """A job that cannot be begun, with the reason among its words."""
+    why = str(error)
+    if isinstance(error, OSError):  # its folder has gone, it is too long, no room for another process
+        why = f"{error.filename or 'the command'}: {error.strerror or error}"
+    said = " ".join(spelt(why).split())
+    with suppress(InercalError, OSError):
+        write_text(job.folder / "said", f"inercal: error: {said}\n")
+    return replace(job, state=State.REFUSED, code=2)
+
+
 def _begun(job: Job, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
-    """The process of a job, with its variables."""
+    """The process of a job, with its variables; it imports nothing from its folder, where files that were sent lie."""
     with open(job.folder / "said", "wb") as said, open(job.folder / "printed", "wb") as printed:
         return subprocess.Popen(
-            [sys.executable, "-m", "inercal.workbench.child", str(job.folder), *job.arguments],
+            [sys.executable, "-P", "-m", "inercal.workbench.child", str(job.folder), *job.arguments],
             cwd=job.where,
             env=environment,
             stdin=subprocess.PIPE,
@@ -262,6 +310,11 @@ def _ended(job: Job) -> Job:
     return replace(job, state=State.DONE if code in (0, 1) else State.REFUSED, code=code)
 
 
+def _is_number(name: str) -> bool:
+    """True for the name of a job's folder."""
+    return name.isascii() and name.isdigit()
+
+
 def _without_store(arguments: Iterable[str]) -> tuple[str, ...]:
     """Arguments without the store, which 0.2.0 put there and the environment holds now, and without other secrets."""
     kept, words = [], iter(arguments)
@@ -277,13 +330,19 @@ def _found(folder: Path) -> Job | None:
     """The job of a folder, as the program that ended left it; None where it is none."""
     try:
         about = json.loads(read_bytes(folder / _ABOUT))
-        state = State(about["state"])
-        job = Job(
-            folder.name, folder, about["session"], _without_store(about["arguments"]), Path(about["where"]), state,
-            about["made"], about["code"],
-        )  # fmt: skip
-    except (OSError, ValueError, KeyError, TypeError):
+        state, code, arguments = State(about["state"]), about["code"], about["arguments"]
+        texts = [about["session"], about["where"], about["made"], *arguments]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+    sound = isinstance(arguments, list) and arguments and isinstance(code, int | None)
+    if not (sound and _is_number(folder.name) and all(isinstance(each, str) for each in texts)):
+        return None
+    session, where, made, *words = map(spelt, texts)
+    if not (kept := _without_store(words)):
+        return None
+    job = Job(folder.name, folder, session, kept, Path(where), state, made, code)
     if state is State.RUNNING:
         return _ended(job)
+    if state is State.WAITING and [session, where, made, *words] != texts:
+        return _refused(job, ValueError("found a text that no command can have, expected plain text"))
     return job

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.errors import InercalError, InputError
+from inercal.errors import InercalError, InputError, plain
 from inercal.live.address import Mqtt, Pieces, Replay, Sink, Source, Text, sink_of, source_of
 from inercal.live.feed import frame_of
 from inercal.live.measurement import Measurement, Plan
@@ -147,6 +147,12 @@ def _prepared(session: Session, wish: Wish) -> Live:
         raise InputError(session.title, "found no study, expected one that says what is measured")
     if not 0.0 <= wish.every < math.inf:
         raise InputError("every", f"found {wish.every}, expected a time from 0 on")
+    for where, text in (
+        ("source", wish.source),
+        ("record", wish.record),
+        *(("to", each) for each in wish.to),
+    ):
+        plain(where, text)
     study = read_study(session.kind, session.study)
     folder = session.folder / FOLDER
     typed = [sink_of(each) for each in wish.to]

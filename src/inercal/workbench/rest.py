@@ -14,8 +14,8 @@ from fastapi.responses import FileResponse, JSONResponse
 from pydantic import BaseModel
 
 from inercal import __version__
-from inercal.errors import InercalError, InputError
-from inercal.workbench.bench import Bench
+from inercal.errors import InercalError, InputError, spelt
+from inercal.workbench.bench import Bench, said_of
 from inercal.workbench.guard import REPORT_POLICY
 from inercal.workbench.jobs import Job
 from inercal.workbench.rest_live import add_live
@@ -209,7 +209,7 @@ _ALONE = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
 
 def _refused(request: Request, error: Exception) -> JSONResponse:
     """The sentence of a refusal."""
-    return JSONResponse({"error": str(error)}, 422)
+    return JSONResponse({"error": said_of(error)}, 422)
 
 
 def _misshapen(request: Request, error: Exception) -> JSONResponse:
@@ -217,7 +217,8 @@ def _misshapen(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     where = ".".join(str(each) for each in first["loc"][:6])
-    return JSONResponse({"error": f"{where}: {first['msg']}, expected it as /api/v1/openapi.json says"}, 422)
+    words = spelt(f"{where}: {first['msg']}")
+    return JSONResponse({"error": f"{words}, expected it as /api/v1/openapi.json says"}, 422)
 
 
 def _of_session(session: Session) -> dict[str, Any]:
@@ -227,7 +228,7 @@ def _of_session(session: Session) -> dict[str, Any]:
         "title": session.title,
         "kind": session.kind,
         "made": session.made,
-        "files": [path.name for path in session.files],
+        "files": [spelt(path.name) for path in session.files],
         "map": None if session.map is None else session.map.name,
         "study": None if session.study is None else session.study.name,
     }

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from inercal._files import read_bytes, write_bytes, write_text
-from inercal.errors import InputError
+from inercal.errors import InputError, plain, spelt
 from inercal.examples import EXAMPLES, FOLDER
 
 MAP, STUDY = "study-map.toml", "study.toml"
@@ -109,12 +109,15 @@ class Sessions:
         folder = self.root / number
         try:
             about: dict[str, Any] = json.loads(read_bytes(folder / _ABOUT))
-            return Session(number, folder, str(about["title"]), str(about["kind"]), str(about["made"]))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            title, kind, made = (spelt(str(about[key])) for key in ("title", "kind", "made"))
+            COMMANDS[kind]
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"session {number}", "found none, expected one that was begun") from error
+        return Session(number, folder, title, kind, made)
 
     def begin(self, title: str, kind: str = "imu") -> Session:
-        """A new session without files."""
+        """A new session without files; raises `InputError` for a title that is no plain text."""
+        plain("title", title)
         self.root.mkdir(parents=True, exist_ok=True)
         numbers = [int(folder.name) for folder in self.root.iterdir() if folder.name.isdigit()]
         number = max(numbers, default=0)
@@ -227,5 +230,5 @@ def _hidden(name: str) -> bool:
 
 
 def put(session: Session, name: str, text: str) -> None:
-    """Write the map or the study of a session."""
-    write_bytes(session.folder / name, text.encode())
+    """Write the map or the study of a session; raises `InputError` for what is no plain text."""
+    write_bytes(session.folder / name, plain(name, text).encode())

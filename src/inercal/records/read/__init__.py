@@ -207,6 +207,11 @@ def _assigned(files: Sequence[Path], record_map: RecordMap) -> list[tuple[Path, 
     return jobs
 
 
+def files_named(files: Sequence[Path], record_map: RecordMap) -> tuple[Path, ...]:
+    """The files that are read by a map: those given, and those that it names; raises `RecordError` or `MapError`."""
+    return tuple(path for path, _ in _assigned(files, record_map))
+
+
 def _without_time(part: Part) -> Part:
     """A part whose time column is not to be trusted, and so not to be read."""
     return replace(part, channels=tuple(channel for channel in part.channels or () if channel.name != "t"))

@@ -157,9 +157,8 @@ def _spawned(work: Work[Any], size: int, progress: Tell) -> _Ended:
         name = Path(folder, "answer")
         command = [sys.executable, "-P", "-m", __name__, str(name)]
         package = str(Path(__file__).parents[3])
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join([package, os.environ.get("PYTHONPATH", "")])
-        }
+        before = os.environ.get("PYTHONPATH")  # an empty part would be the working folder, anybody's
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, before)))}
         child = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
         )

@@ -84,7 +84,8 @@ class Editor:
         if text == self.text:
             return
         self.text = text
-        put(self.session, STUDY, text)
+        with told():
+            put(self.session, STUDY, text)
         self.judge()
         self.fill()
 
