@@ -7,6 +7,7 @@ from absurd.draws import Draws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
+from inercal.aoa.estimators import STATICS
 from inercal.aoa.result.columns import angles_record, points_record
 from inercal.aoa.result.tables import answer, delays, on_page, on_terminal, rest_of_fit, use_of_fit
 from inercal.aoa.settings import GYROS, Methods
@@ -65,7 +66,7 @@ def _run(done, draws):
     methods = None
     if draws.chance(0.3):
         methods = Methods(
-            draws.pick("segmented", "complementary", "improved", "difference", "gls"),
+            draws.pick(*STATICS),
             draws.pick("none", "low-pass", "mechanical", "decision"),
             draws.pick("none", "differentiated", "dual"),
         )

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inercal._files import read_bytes
 from inercal.errors import InputError
-from inercal.keys import keys_of
+from inercal.keys import in_place_of, keys_of
 from inercal.units import shown
 
 
@@ -91,6 +91,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: unknown key, {hint}"
         case "missing":
             return f"{key}: missing, expected a value"
+        case "literal_error" if gone := in_place_of(key, str(value)):
+            return f"{key}: found {shown(value)}, {gone}"
         case "literal_error":
             return f"{key}: found {shown(value)}, expected {first['ctx']['expected']}"
         case "model_type" | "dict_type":

@@ -334,7 +334,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         (["aoa", *AOA[2:]], ["FILES is missing", "--stream"]),
         ([*AOA, "--static", "kalman"], ["kalman", "improved"]),
         ([*AOA, "--states", "9"], ["9", "19"]),
-        ([*AOA, "--smooth", "--static", "gls"], ["--smooth", "--static"]),
+        ([*AOA, "--smooth", "--static", "segmented"], ["--smooth", "--static"]),
         ([*AOA, "--states", "8", "--tangential", "dual"], ["--states", "--tangential"]),
         ([*AOA, "--out", "cal.txt"], ["cal.txt", "'.txt'", ".json"]),
         ([*AOA, "--out", "model.csv"], ["is an input"]),

@@ -13,6 +13,7 @@ import numpy as np
 from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
+from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
 from inercal.aoa.layout import AXES, Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
@@ -30,16 +31,10 @@ from inercal.keys import (
 )
 from inercal.units import STANDARD_GRAVITY, Quantity
 
-States = Literal[8, 11, 15, 19]
-Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
-Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
-Tangential = Literal["none", "differentiated", "dual"]
 Per = Literal["1", "V", "count"]
 PointsBy = Literal["auto", "point", "trigger", "pause"]
 AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
-
-STATES: tuple[States, ...] = (8, 11, 15, 19)
 
 GYROS = ("gyro", "gyro_roll", "gyro_yaw")
 

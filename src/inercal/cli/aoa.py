@@ -6,10 +6,11 @@ import time
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
@@ -21,11 +22,6 @@ if TYPE_CHECKING:
     from inercal.records.record import Record
     from inercal.stream.lines import Lines
     from inercal.stream.run import Recursive
-
-Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
-Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
-Tangential = Literal["none", "differentiated", "dual"]
-States = Literal[8, 11, 15, 19]
 
 
 @Parameter(name="*")

@@ -33,8 +33,6 @@ MEASURED = (
     Methods(),
     Methods(static="complementary"),
     Methods(static="segmented"),
-    Methods(static="difference"),
-    Methods(static="gls"),
     Methods(centrifugal="low-pass"),
     Methods(centrifugal="decision"),
     Methods(tangential="differentiated"),
@@ -103,9 +101,7 @@ def each_row(recording: Recording, settings: AoaSettings, methods: Methods) -> A
             w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
             terms = error_terms(settings, methods.tangential, layout, level, w, al, compensated[rows], step)
             errors = [(weight, dual @ matrix @ dual.T) for weight, matrix in terms]
-            still = static.angle(
-                methods.static, read @ dual.T, layout, settings.site.gravity, level, errors[0][1]
-            )
+            still = static.angle(methods.static, read @ dual.T, layout, settings.site.gravity, level)
         except StudyError:  # too few axes are left in these rows
             acceleration[rows] = np.nan
             continue

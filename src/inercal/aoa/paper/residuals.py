@@ -17,9 +17,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from inercal.aoa.estimators import Tangential
 from inercal.aoa.layout import Layout, all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.paper.static import Errors
-from inercal.aoa.settings import AoaSettings, Noise, Prior, Tangential
+from inercal.aoa.settings import AoaSettings, Noise, Prior
 from inercal.arrays import Array
 
 DECISION = 2.0 + math.sqrt(6.0)
