@@ -271,17 +271,6 @@ def test_a_stream_gives_the_bytes_of_the_file(how, low_pass, capsys, monkeypatch
     assert {line.split(",")[5] for line in out.splitlines()} <= {"status [1]", "0.0", "2.0"}
 
 
-def test_the_paper_goes_live_with_the_angles_of_the_file(capsys, monkeypatch):
-    how = ["--static", "improved", "--set", "timing.gyro_delay=0 ms"]
-    assert run([*AOA, *how, "--out", "angles.csv", "--quiet"]) == 0
-    code, out, err = piped(monkeypatch, capsys, "aoa", "--stream", *AOA[2:], *how, "--quiet")
-    assert (code, err) == (0, "")
-    found, wanted = (
-        np.genfromtxt(each.splitlines()[1:], delimiter=",") for each in (out, Path("angles.csv").read_text())
-    )
-    np.testing.assert_allclose(found, wanted, rtol=1e-7)
-
-
 def test_a_stream_from_a_file_a_line_a_second(capsys):
     assert run([*AOA, "--stream", "--every", "1 s", "--quiet"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -347,7 +336,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         ([*AOA, "--stream", "--compare"], ["--compare", "stream"]),
         ([*AOA, "--stream", "--smooth"], ["--smooth", "stream"]),
         ([*AOA, "--stream", "--points"], ["--points", "stream"]),
-        ([*AOA, "--stream", "--centrifugal", "decision"], ["methods.centrifugal", "stream", "looks ahead"]),
+        ([*AOA, "--stream", "--centrifugal", "decision"], ["--centrifugal", "stream", "fusion", "files"]),
         ([*AOA, "--stream", "--set", "estimator.smooth=true"], ["aoa.toml", "estimator.smooth", "past"]),
         ([*AOA, "--stream", "--every", "0 s"], ["--every", "above 0"]),
         ([*AOA, "--stream", "--checkpoint", "model.csv"], ["is an input"]),

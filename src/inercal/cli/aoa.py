@@ -74,6 +74,11 @@ class MethodOptions:
             raise InputError(
                 option, f"found with {chosen[0]}, expected the fusion or the paper's way, not both"
             )
+        if stream and chosen:
+            raise InputError(
+                chosen[0],
+                "found with a stream, expected the fusion, which is the default: the paper's way is for files",
+            )
         whole = {"--compare": self.compare, "--smooth": self.smooth, "--points": self.points}
         for option in (name for name, given in whole.items() if given):
             if stream:
@@ -127,7 +132,7 @@ def aoa(
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
         made: list[Any] = []
-        prepare = partial(_live, made, how)
+        prepare = partial(_live, made)
         stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
         failure = made[-1].failure if made else ""
         if failure:
@@ -200,7 +205,6 @@ def _runs(
 
 def _live(
     made: list[Any],
-    how: MethodOptions,
     settings: AoaSettings,
     interval: float,
     output: ResultOutput,
@@ -208,7 +212,7 @@ def _live(
     """Prepare a measurement row by row; ``made`` receives it."""
     from inercal.live.estimators import aoa as prepared
 
-    make = prepared(settings, interval, output.say, output.say_finding, how.methods(settings))
+    make = prepared(settings, interval, output.say, output.say_finding)
 
     def estimator(lines: Lines) -> Recursive[Any]:
         made.append(make(lines))
