@@ -65,7 +65,8 @@ def check(model: type[M], data: Mapping[str, Any], where: object, error: type[In
         first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
         cause = first.get("ctx", {}).get("error")
         if isinstance(cause, InputError):
-            raise error(where, f"{_dotted(first['loc'])}: {cause.message}") from problem
+            at = f"{_dotted(first['loc'])}: " if first["loc"] else ""
+            raise error(where, f"{at}{cause.message}") from problem
         raise error(where, _sentence(model, first)) from problem
     except InputError as problem:  # raised by a validator with its own words
         raise error(where, str(problem)) from problem

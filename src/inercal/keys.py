@@ -140,13 +140,10 @@ def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:
 
 
 GONE: Mapping[tuple[str, str], str] = {
-    (
-        "static",
-        "difference",
-    ): "complementary, the same angle once the dual accelerometer has made both axes equal",
+    ("static", "difference"): "complementary, the same angle once the dual accelerometer has made both axes equal",
     ("static", "gls"): "the fusion, which weighs all axes by their errors",
-}
-"""Key or option, and its choice, that a version up to 0.2.0 took: what to use in its place."""
+}  # fmt: skip
+"""Choices that versions up to 0.2.0 had, by key or option and choice: what to use in their place."""
 
 
 def in_place_of(key: str, choice: str) -> str | None:

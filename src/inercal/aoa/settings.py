@@ -14,7 +14,7 @@ from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
 from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
-from inercal.aoa.layout import AXES, Layout
+from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
@@ -33,7 +33,6 @@ from inercal.units import STANDARD_GRAVITY, Quantity
 
 Per = Literal["1", "V", "count"]
 PointsBy = Literal["auto", "point", "trigger", "pause"]
-AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
 GYROS = ("gyro", "gyro_roll", "gyro_yaw")
@@ -333,23 +332,6 @@ class MotionPlan:
 
 
 @dataclass(frozen=True)
-class Design:
-    """Places where accelerometers may sit, for `inercal design aoa`."""
-
-    accelerometers: int = option(
-        "how many; as many as there are under [sensors] if 0", 0, example=3, least=0, most=12
-    )
-    rearmost: float = quantity(
-        "position of the rearmost place, negative behind the pivot", "length", "-0.25 m", bounds=_WITHIN
-    )
-    foremost: float = quantity("position of the foremost place", "length", "0.25 m", bounds=_WITHIN)
-    places: int = option("places, evenly from the rearmost to the foremost", 5, least=2, most=41)
-    axes: tuple[AxisName, ...] = option(
-        "axes that they may look along", tuple(AXES), example=["+x", "+z", "-z"]
-    )
-
-
-@dataclass(frozen=True)
 class Goal:
     """Wanted standard uncertainty, for `inercal design aoa`."""
 
@@ -366,6 +348,7 @@ class AoaSettings:
     ``sensors`` holds the calibrations by name: those of the layout, and ``gyro``, ``gyro_roll``, ``gyro_yaw``.
     ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`. ``corrections`` are scale and
     axis angle [rad] by which an earlier run changed accelerometers, by name (`inercal.aoa.reference.corrections`).
+    ``layouts`` are those that a design compares with the stated one, by name.
     """
 
     site: Site
@@ -383,7 +366,7 @@ class AoaSettings:
     alarm: Alarm = field(default_factory=Alarm)
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
-    design: Design = field(default_factory=Design)
+    layouts: Mapping[str, Layout] = field(default_factory=dict)
     goal: Goal = field(default_factory=Goal)
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

@@ -153,33 +153,30 @@ def prepare_design(study: Study) -> None:
 
 
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
-    """Find where accelerometers tell the angle best; ``evidence`` is the `inercal.aoa.design.Designed`."""
-    from inercal.aoa.design import REFERENCES
-    from inercal.aoa.design import design as search
+    """Say what the stated layout of the sensors, and those beside it, can tell of the angle.
 
-    designed, result = designed_by("design aoa", study, lambda: search(study.settings, progress), REFERENCES)
+    ``evidence`` is the `inercal.aoa.design.Compared`.
+    """
+    from inercal.aoa.design import REFERENCES, compare
+
+    compared, result = designed_by("design aoa", study, lambda: compare(study.settings, progress), REFERENCES)
 
     def page() -> str:
         from inercal.aoa.figures import layouts
         from inercal.report.html import render
 
-        return render(
-            result,
-            layouts.pictures(designed, study.settings),
-            "Sensors of a wind-tunnel model",
-            (),
-            designed.tables(),
-        )
+        drawn = layouts.pictures(compared, study.settings)
+        return render(result, drawn, "Sensors of a wind-tunnel model", (), compared.tables())
 
     def picture() -> Picture:
         from inercal.aoa.figures import layouts
 
-        return layouts.best(designed)
+        return layouts.main(compared, study.settings)
 
     def tables() -> list[str]:
-        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+        return [f"{table.title}\n{table.text()}" for table in compared.tables()]
 
-    return Result(result, View(result, designed.message, tables, page, picture), designed)
+    return Result(result, View(result, compared.message, tables, page, picture), compared)
 
 
 def _answer(result: dict[str, Any] | Any) -> str:
