@@ -1,5 +1,7 @@
 """Absurd measurements of the angle of attack: layouts, noise, motions and recordings that nobody would take."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from absurd import laws
@@ -63,7 +65,6 @@ def _run(done, draws):
     if draws.chance(0.1):
         _stream(done, record, settings)
         return
-    methods = None
     if draws.chance(0.3):
         methods = Methods(
             draws.pick(*STATICS),
@@ -71,9 +72,10 @@ def _run(done, draws):
             draws.pick("none", "differentiated", "dual"),
         )
         done.words.append(repr(methods))
+        settings = replace(settings, methods=methods, estimator=replace(settings.estimator, kind="paper"))
     beside = draws.chance(0.02)
     done.words += ["compared"] if beside else []
-    found = measure(record, settings, methods, beside)
+    found = measure(record, settings, beside)
     estimate = found.estimate
     done.outcome = estimate.status.value
     done.wrong += laws.of_estimate(estimate)
@@ -83,7 +85,7 @@ def _run(done, draws):
     delays(estimate), use_of_fit(estimate), rest_of_fit(estimate)
     angles_record(found.recording, found.angles, found.settings)
     points_record(found.points, found.recording, found.settings)
-    if done.outcome == "ok" and not faults and methods is None and _obeyed(done.study):
+    if done.outcome == "ok" and not faults and found.filtered is not None and _obeyed(done.study):
         known = np.isfinite(found.angles.theta)
         off = np.remainder(found.angles.theta - simulated.theta + np.pi, 2.0 * np.pi) - np.pi
         done.wrong += laws.of_truth(off[known], found.angles.u[known], 0.0, ["theta"] * int(known.sum()))[:1]

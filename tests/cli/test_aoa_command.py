@@ -176,6 +176,18 @@ def test_every_choice_of_the_paper(option, choices, capsys):
         assert data["result"]["reference"]["max_abs_deg"] < 20.0
 
 
+def test_a_study_asks_for_the_paper_as_options_do(capsys):
+    """Options are keys of the study: the same digits, and the same keys in the provenance."""
+    by_option = told(capsys, *AOA, "--static", "segmented")[1]
+    keys = ["--set", "estimator.kind=paper", "--set", "methods.static=segmented"]
+    by_key = told(capsys, *AOA, *keys)[1]
+    assert by_key["result"] == by_option["result"]
+    assert by_key["provenance"]["settings"] == by_option["provenance"]["settings"]
+    assert by_key["provenance"]["settings"]["estimator"]["kind"] == "paper"
+    by_fusion = told(capsys, *AOA, *keys, "--states", "8")[1]
+    assert by_fusion["result"]["method"] == "fusion 8"
+
+
 def test_choices_combine_and_beat_nothing_done(capsys):
     """Untreated, the lever arms of 10 deg at 1 Hz cost degrees; the paper's best way leaves hundredths."""
     none = ["--centrifugal", "none", "--tangential", "none"]
@@ -338,6 +350,7 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         ([*AOA, "--stream", "--points"], ["--points", "stream"]),
         ([*AOA, "--stream", "--centrifugal", "decision"], ["--centrifugal", "stream", "fusion", "files"]),
         ([*AOA, "--stream", "--set", "estimator.smooth=true"], ["aoa.toml", "estimator.smooth", "past"]),
+        ([*AOA, "--stream", "--set", "estimator.kind=paper"], ["aoa.toml", "estimator.kind", "files"]),
         ([*AOA, "--stream", "--every", "0 s"], ["--every", "above 0"]),
         ([*AOA, "--stream", "--checkpoint", "model.csv"], ["is an input"]),
         (["aoa", "model.csv", "pauses.csv", *AOA[2:], "--stream"], ["--stream", "2 files"]),

@@ -82,7 +82,7 @@ def test_all_that_settings_hold_is_reached():
             "axial": {"level": "1 mg"},
         },
         timing={"gyro_delay": "-2 ms", "common_delay": "1 ms"},
-        estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9},
+        estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9, "kind": "paper"},
         methods={"static": "complementary", "centrifugal": "low-pass", "tangential": "none"},
         model={"roll": "2.0(1) deg", "yaw": "-1 deg"},
         flow={"upwash": "0.10(2) deg", "sidewash": "1 mrad"},
@@ -114,7 +114,7 @@ def test_all_that_settings_hold_is_reached():
     assert (prior.axial.frequency, prior.axial.level) == pytest.approx((12 * two_pi, 1e-3 * G))
     assert (found.timing.gyro_delay, found.timing.common_delay) == pytest.approx((-2e-3, 1e-3))
     assert found.timing.common_delay_u == 0.0
-    assert found.estimator == Estimator(8, True, None, 2e6, 9.0)
+    assert found.estimator == Estimator(8, True, None, 2e6, 9.0, "paper")
     assert found.methods == Methods("complementary", "low-pass", "none")
     of = found.attitude
     assert (of.roll.value, of.roll.u, of.yaw.value) == pytest.approx((2 * DEG, 0.1 * DEG, -DEG))

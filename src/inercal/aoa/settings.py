@@ -13,7 +13,7 @@ import numpy as np
 from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
-from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
+from inercal.aoa.estimators import WORDS, Centrifugal, EstimatorKind, States, Static, Tangential
 from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
@@ -167,7 +167,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Estimator:
-    """The fusion of all sensors.
+    """The estimator of the angle; keys other than its kind are of the fusion of all sensors.
 
     ``snap`` [rad^2/s^7], None where the recording decides (`inercal.aoa.diagnosis.choice`); until then `density`.
     """
@@ -183,6 +183,7 @@ class Estimator:
     gate: float = option(
         "innovation squared over its variance from which a sample is held back", 25.0, least=1.0
     )
+    kind: EstimatorKind = option("; ".join(f"{kind}: {words}" for kind, words in WORDS.items()), "fusion")
 
     @property
     def density(self) -> float:
@@ -193,7 +194,7 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Methods:
-    """The paper's way, where an option of the command asks for it; options override these keys."""
+    """The paper's way, for the estimator of that kind."""
 
     static: Static = option("the static mechanisation", "improved")
     centrifugal: Centrifugal = option("compensation of r w^2", "mechanical")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +17,7 @@ from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.aoa.settings import AoaSettings
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
     from inercal.stream.lines import Lines
@@ -64,8 +64,13 @@ class MethodOptions:
     @property
     def keys(self) -> list[str]:
         """The overrides of the study that stand for options."""
-        states = [] if self.states is None else [f"estimator.states={self.states}"]
-        return [*states, *(["estimator.smooth=true"] if self.smooth else [])]
+        kind = "paper" if self.paper else "fusion" if any(self.fusion.values()) else ""
+        return [
+            *([f"estimator.kind={kind}"] if kind else []),
+            *(f"methods.{name}={choice}" for name, choice in self.paper.items()),
+            *([] if self.states is None else [f"estimator.states={self.states}"]),
+            *(["estimator.smooth=true"] if self.smooth else []),
+        ]
 
     def check(self, stream: bool) -> None:
         """Fail where options contradict each other; raises `InputError`."""
@@ -86,10 +91,6 @@ class MethodOptions:
                     option,
                     "found with a stream, expected one method that does not look ahead, a line for each sample",
                 )
-
-    def methods(self, settings: AoaSettings) -> Methods | None:
-        """The paper's way, what was not chosen as the study says; None for the fusion."""
-        return replace(settings.methods, **self.paper) if self.paper else None  # type: ignore[arg-type]
 
 
 def aoa(
@@ -148,15 +149,14 @@ def aoa(
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study = read_study("aoa", study, keys)
     output.spare(the_study.files)
-    methods = how.methods(the_study.settings)
     clock = time.perf_counter()
     record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
     read_s = time.perf_counter() - clock
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        system.prepare(the_study, how.compare, methods)
+        system.prepare(the_study, how.compare)
     with working(output) as progress:
-        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points, join)
+        result = system.calibrate([record], the_study, how.compare, progress, how.points, join)
     return give(result, output, read_s, "angles")
 
 
@@ -189,17 +189,16 @@ def _runs(
     output.spare(the_study.files)
     span.check()
     record_map = None if map_file is None else read_map(map_file)
-    methods = how.methods(the_study.settings)
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        system.prepare(the_study, how.compare, None)
+        system.prepare(the_study, how.compare)
 
     def record(path: Path) -> Record:
         output.spare([path])
         return span.of(read(path, record_map))
 
     with working(output) as progress:
-        result = system.runs(table, the_study, record, how.compare, progress, methods)
+        result = system.runs(table, the_study, record, how.compare, progress)
     return give(result, output, 0.0, "runs")
 
 

@@ -19,7 +19,7 @@ from inercal.records.read import source_of
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.aoa.settings import AoaSettings
     from inercal.report.html import Picture
 
 ONE_RUN = (
@@ -28,10 +28,10 @@ ONE_RUN = (
 )
 
 
-def prepare(study: Study, compare: bool = False, methods: Methods | None = None) -> None:
+def prepare(study: Study, compare: bool = False) -> None:
     """Load, or compile, the kernels of `calibrate`, so that they do not count in its time."""
     with study.at_fault():
-        task.load_kernels(study.settings, methods, compare)
+        task.load_kernels(study.settings, compare)
 
 
 def calibrate(
@@ -39,19 +39,18 @@ def calibrate(
     study: Study,
     compare: bool = False,
     progress: Progress = lambda _: None,
-    methods: Methods | None = None,
     by_point: bool = False,
     join: str | Path | None = None,
 ) -> Result:
     """Measure the angle of attack; ``evidence`` is the `inercal.aoa.task.Measurement`.
 
-    Parameters and errors are those of `inercal.calibrate`. ``methods`` ask for the paper's way; ``by_point`` for a row
-    for each point in the place of one for each sample, with the columns of the table ``join`` beside.
+    Parameters and errors are those of `inercal.calibrate`. ``by_point`` asks for a row for
+    each point in the place of one for each sample, with the columns of the table ``join`` beside.
     """
     record = one_run(records, ONE_RUN)
 
     def run(given: Record, settings: AoaSettings, say: Progress) -> task.Measurement:
-        return task.measure(given, settings, methods, compare, say)
+        return task.measure(given, settings, compare, say)
 
     other = None if join is None else read_balance(join)
     (measurement,) = calibrations([record], study, progress, run)
@@ -75,7 +74,6 @@ def runs(
     read: Callable[[Path], Record],
     compare: bool = False,
     progress: Progress = lambda _: None,
-    methods: Methods | None = None,
 ) -> Result:
     """Measure the runs that a table lists; ``evidence`` is the `inercal.aoa.runs.series.Series`.
 
@@ -86,9 +84,7 @@ def runs(
 
     table = read_runs_table(path)
     with study.at_fault():
-        done = series.measure_runs(
-            table, lambda run: read(run.path), study.settings, methods, compare, progress
-        )
+        done = series.measure_runs(table, lambda run: read(run.path), study.settings, compare, progress)
     estimate = replace(done.estimate, inputs=(*done.estimate.inputs, *map(source_of, study.files)))
     done = replace(done, estimate=estimate)
 

@@ -54,10 +54,16 @@ def of_study(study: Study, interval: float, say: Say, say_finding: SayFinding) -
 
 def aoa(settings: AoaSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
     """Prepare a measurement of angles by the fusion. Raises `StudyError` for one that looks ahead."""
+    from inercal.aoa.estimators import STREAMED
     from inercal.aoa.fusion.live_band import load_kernels
     from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
 
+    if (kind := settings.estimator.kind) not in STREAMED:
+        raise StudyError(
+            "estimator.kind",
+            f"found {kind} with a stream, expected {' or '.join(STREAMED)}: {kind} is for files",
+        )
     if settings.estimator.smooth:
         raise StudyError(
             "estimator.smooth", "found true with a stream, expected false: it knows the past alone"

@@ -183,7 +183,7 @@ class BandTable(Strict):
 
 
 class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
-    """The fusion of all sensors."""
+    """The estimator of the angle; keys other than its kind are of the fusion of all sensors."""
 
     snap: _Snap = Field(
         default=None,
@@ -235,7 +235,9 @@ class AoaStudyFile(Strict):
     band: BandTable = Field(
         default=BandTable(), title="Band", description="what of the sensors the fusion takes"
     )
-    estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
+    estimator: EstimatorTable = Field(
+        default=EstimatorTable(), title="Estimator", description="how the angle is found"
+    )
     methods: Stated[Methods] = Field(default=Methods(), title="Methods", description="the paper's way")
     model: Stated[ModelAttitude] = Field(
         default=ModelAttitude(), title="Model", description="how the model lies"

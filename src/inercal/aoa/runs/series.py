@@ -15,7 +15,7 @@ from inercal.aoa.runs.outcome import assemble
 from inercal.aoa.runs.run_table import Run, RunTable
 from inercal.aoa.runs.summary import AtPoint, Oscillation, by_point, oscillations
 from inercal.aoa.runs.tare import Posterior, WindOff, drifts, interpolated
-from inercal.aoa.settings import GYROS, AoaSettings, Methods, Zero
+from inercal.aoa.settings import GYROS, AoaSettings, Zero
 from inercal.aoa.task import Measurement
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
@@ -49,7 +49,6 @@ def measure_runs(
     table: RunTable,
     read: Callable[[Run], Record],
     settings: AoaSettings,
-    methods: Methods | None = None,
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Series:
@@ -69,9 +68,9 @@ def measure_runs(
         if run.role != "wind-off":
             continue
         progress(f"{run.name}, wind-off")
-        found = _measured(
-            run, records[run], _at_known_angle(settings, run, records[run]), None, False, progress
-        )
+        at_rest = _at_known_angle(settings, run, records[run])
+        fused = replace(at_rest, estimator=replace(at_rest.estimator, kind="fusion"))
+        found = _measured(run, records[run], fused, False, progress)
         if not found.estimate.status.done:
             raise RecordError(
                 run.path,
@@ -88,9 +87,9 @@ def measure_runs(
         progress(run.name)
         known, words = interpolated(tares, at[run]) if tares else (None, "")
         chosen = settings
-        if known is not None and methods is not None:
+        if known is not None and settings.estimator.kind != "fusion":
             chosen, known = _without_biases(settings, known), None
-        found = _measured(run, records[run], chosen, methods, compare, progress, known)
+        found = _measured(run, records[run], chosen, compare, progress, known)
         done[run] = MeasuredRun(run, found, words)
     measured = tuple(done[run] for run in table.runs)
     winds = [each for each in measured if each.run.role != "wind-off"]
@@ -107,14 +106,13 @@ def _measured(
     run: Run,
     record: Record,
     settings: AoaSettings,
-    methods: Methods | None,
     compare: bool,
     progress: Callable[[str], None],
     known: Posterior | None = None,
 ) -> Measurement:
     """One run; a refusal names its file."""
     try:
-        return task.measure(record, settings, methods, compare, progress, known)
+        return task.measure(record, settings, compare, progress, known)
     except RecordError as error:
         raise RecordError(run.path, str(error).removeprefix(f"{run.path}: ")) from error
 
