@@ -19,7 +19,6 @@ from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.filter_result import FilterResult
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.paper.delay import Delay
-from inercal.aoa.paper.integrated import integrated
 from inercal.aoa.paper.methods import MEASURED, label
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.result.systematic import by_fusion, by_methods
@@ -146,13 +145,6 @@ ESTIMATORS: Mapping[EstimatorKind, AngleEstimator] = {
         _by_paper,
         lambda recording, of: by_methods(recording, of, of.methods),
         _papers,
-        lambda _: None,
-    ),
-    "integrated": AngleEstimator(
-        lambda _: "integrated",
-        lambda case, _: Found(integrated(case.recording, case.settings)),
-        integrated,
-        lambda of: [replace(of, estimator=replace(of.estimator, kind="integrated"))],
         lambda _: None,
     ),
 }

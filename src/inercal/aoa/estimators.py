@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final, Literal, get_args
 
-EstimatorKind = Literal["fusion", "paper", "integrated"]
+EstimatorKind = Literal["fusion", "paper"]
 
 WORDS: Final[Mapping[EstimatorKind, str]] = {
     "fusion": "a filter of all sensors",
     "paper": "sample by sample, as [methods] says",
-    "integrated": "the gyro alone",
 }
 
 STREAMED: Final[tuple[EstimatorKind, ...]] = ("fusion",)
