@@ -16,7 +16,7 @@ from inercal.aoa.diagnosis.unseen import unseen
 from inercal.aoa.estimators import EstimatorKind
 from inercal.aoa.fusion import filter_result, live_band, smoother
 from inercal.aoa.fusion.band import fused_case
-from inercal.aoa.fusion.filter_result import FilterResult
+from inercal.aoa.fusion.filter_result import FilterResult, fusion_label
 from inercal.aoa.fusion.problem import FilterProblem, problem
 from inercal.aoa.paper.delay import Delay
 from inercal.aoa.paper.methods import MEASURED, label
@@ -134,7 +134,7 @@ def _papers(settings: AoaSettings) -> list[AoaSettings]:
 
 ESTIMATORS: Mapping[EstimatorKind, AngleEstimator] = {
     "fusion": AngleEstimator(
-        lambda of: f"{'smoothed' if of.estimator.smooth else 'fusion'} {of.estimator.states}",
+        lambda of: fusion_label(of.estimator.smooth, of.estimator.states),
         _fusion,
         _fusion_alone,
         _fusions,

@@ -49,7 +49,6 @@ _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg 
 _WALK = within(0.0, math.inf, "a random walk of 0 or more")
 _K2 = within(0.0, 0.1, "a coefficient from 0 to 0.1 s^2/m")
 _WAIT = within(0.0, 1e6, "a time of 0 or more")
-_WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
 
 

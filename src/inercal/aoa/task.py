@@ -1,4 +1,4 @@
-"""The task of the command: angles of attack from a record, by one method or by many."""
+"""The task of the command: angles of attack from a record, by one estimator or side by side by all."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
 from inercal.aoa.result.alarms import beyond_limits
 from inercal.aoa.result.carry_over import corrected
 from inercal.aoa.result.carry_over import load as load_posterior
-from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.outcome import assemble, assemble_angles
 from inercal.aoa.result.points import Point, points
 from inercal.aoa.result.verification import Errors, errors, late_reference
 from inercal.aoa.settings import AoaSettings
@@ -43,7 +43,7 @@ class Measurement:
     """An ``estimate``, and the data behind it for files and pictures.
 
     ``settings`` are those of the study, corrected by an earlier result, with what the recording decides;
-    ``angles`` of the chosen method; ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest;
+    ``angles`` of the chosen estimator; ``filtered`` of the fusion, None for the paper's methods; ``points`` at rest;
     ``delay`` of the gyro by the spectra; ``errors`` by method and ``verified`` sensors where there is a reference
     angle; ``compared`` angles of other methods, by name.
     """
@@ -68,11 +68,11 @@ def in_order(measurement: Measurement) -> Measurement:
     if len(taken) == len(t):
         return measurement
 
-    def rows(of: Any) -> Any:
-        """A part of the measurement with only the later of all rows."""
-        parts = {each.name: getattr(of, each.name) for each in fields(of)}
-        columns = {name: x for name, x in parts.items() if isinstance(x, np.ndarray) and len(x) == len(t)}
-        return replace(of, **{name: x[taken] for name, x in columns.items()})
+    def rows(table: Any) -> Any:
+        """A dataclass of arrays by row with only the later rows."""
+        values = {column.name: getattr(table, column.name) for column in fields(table)}
+        columns = {name: x for name, x in values.items() if isinstance(x, np.ndarray) and len(x) == len(t)}
+        return replace(table, **{name: x[taken] for name, x in columns.items()})
 
     filtered = measurement.filtered
     if filtered is not None:
@@ -137,13 +137,13 @@ def measure(
     verified = None
     if recording.reference is not None and np.isfinite(recording.reference).any():
         progress("fitting the sensors to the reference angle")
-        judged = {each.method: errors(recording, each) for each in (angles, *compared.values())}
+        judged = {found.method: errors(recording, found) for found in (angles, *compared.values())}
         verified = _fitted(recording, settings, at_rest)
         if filtered is not None:
             findings = [*findings, *late_reference(recording, angles)]
     behind = (findings, delay, at_rest, judged, compared, verified)
     if filtered is None:
-        estimate = assemble_paper(recording, settings, angles, *behind)
+        estimate = assemble_angles(recording, settings, angles, *behind)
     else:
         estimate = assemble(zeroed, settings, of, filtered, *behind, angles=angles)
     estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
@@ -156,7 +156,7 @@ def _fitted(recording: Recording, settings: AoaSettings, at_rest: tuple[Point, .
     """The sensors fitted to the reference angle; None where there is too little of it."""
     try:
         if at_rests_alone(recording):
-            return static_fit(recording, settings, [(each.start, each.stop) for each in at_rest])
+            return static_fit(recording, settings, [(point.start, point.stop) for point in at_rest])
         return fit(recording, settings)
     except RecordError:
         return None

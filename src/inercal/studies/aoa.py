@@ -294,7 +294,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         prior=_prior(file.prior),
         sensors=sensors,
         timing=_timing(file.timing),
-        band=Band(file.band.low_pass, tuple(each.value for each in file.band.notch)),
+        band=Band(file.band.low_pass, tuple(frequency.value for frequency in file.band.notch)),
         estimator=_estimator(file.estimator, path),
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),

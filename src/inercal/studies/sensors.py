@@ -91,7 +91,7 @@ class _SensorTable(Strict):
 
     @model_validator(mode="after")
     def _one_calibration(self) -> _SensorTable:
-        """Refuse what stands beside a file, or is for one."""
+        """Refuse scale or bias beside a calibration file, and a channel without one."""
         beside = [key for key in ("scale", "bias") if getattr(self, key, None) is not None]
         if self.calibration is not None and beside:
             raise refusal(f"found calibration and {beside[0]}, expected one of them")
@@ -212,10 +212,11 @@ def layout_of(table: SensorsTable) -> Layout:
     names = [
         name for name in type(table).model_fields if name not in GYROS and getattr(table, name) is not None
     ]
-    each = [getattr(table, name) for name in names]
-    angles = [AXES[one.axis] if one.angle is None else one.angle.value for one in each]
-    heights = [0.0 if one.z is None else one.z.value for one in each]
-    return Layout(tuple(names), np.array(angles), np.array([one.r.value for one in each]), np.array(heights))
+    sensors = [getattr(table, name) for name in names]
+    angles = [AXES[sensor.axis] if sensor.angle is None else sensor.angle.value for sensor in sensors]
+    ahead = [sensor.r.value for sensor in sensors]
+    heights = [0.0 if sensor.z is None else sensor.z.value for sensor in sensors]
+    return Layout(tuple(names), np.array(angles), np.array(ahead), np.array(heights))
 
 
 _Layout: Any = create_model("Layout", __base__=Strict, **_accelerometers(PlaceTable))

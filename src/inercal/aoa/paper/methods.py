@@ -137,8 +137,8 @@ def _alike(acc: Array) -> Iterator[tuple[NDArray[np.intp], list[int]]]:
     kind = np.zeros(len(acc), dtype=np.int64)
     for k in range(acc.shape[1]):
         kind = 2 * kind + finite[:, k]
-    for each in np.unique(kind[kind > 0]):
-        rows = np.flatnonzero(kind == each)
+    for combination in np.unique(kind[kind > 0]):
+        rows = np.flatnonzero(kind == combination)
         seen = [int(k) for k in np.flatnonzero(finite[rows[0]])]
         yield rows, seen
 

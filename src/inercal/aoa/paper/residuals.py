@@ -87,11 +87,6 @@ def may_be_left(error: float, arm: float) -> float:
     return dual(error, arm, alike=True)
 
 
-def late(peak_rate: float, delay: float) -> float:
-    """Error of the angle [rad] by a ``delay`` [s] of an output: theta' tau."""
-    return peak_rate * delay
-
-
 def sampled(
     r2: float, peak_rate: float, gyro_error: float, gravity: float, samples: float, mean: float = 0.0
 ) -> float:

@@ -141,7 +141,7 @@ def widened(
 
 def gravity_u(settings: AoaSettings) -> float:
     """Standard uncertainty [m/s^2] of the gravity of the site."""
-    return math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in settings.site.inputs))
+    return math.sqrt(sum((quantity.u * quantity.sensitivity) ** 2 for quantity in settings.site.inputs))
 
 
 def uncertain_roll(settings: AoaSettings, tracked: bool) -> float:
