@@ -1,4 +1,4 @@
-"""From line in to line out: the time that `aoa --stream` takes at 1 kHz, by the paper's way and by the fusion.
+"""From line in to line out: the time that `aoa --stream` takes at 1 kHz.
 
     python benchmarks/stream_latency.py [--quick]
 
@@ -26,17 +26,12 @@ from live import model
 WARM = 2000
 """Rows before any counts."""
 
-WAYS = {
-    "fusion": [],
-    "the paper's way": ["--static", "improved", "--centrifugal", "mechanical", "--tangential", "dual"],
-}
 
-
-def latencies(path: Path, options: list[str]) -> np.ndarray:
+def latencies(path: Path) -> np.ndarray:
     """Seconds (n,) from each row in to its angle out."""
     header, *lines = path.read_bytes().splitlines(keepends=True)
     command = [sys.executable, "-m", "inercal", "aoa", "--stream", "--quiet"]
-    command += ["--study", str(FOLDER / "sting.toml"), *options]
+    command += ["--study", str(FOLDER / "sting.toml")]
     sent, come = np.full(len(lines), np.nan), np.full(len(lines), np.nan)
     began = threading.Event()
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0) as process:
@@ -75,28 +70,22 @@ def rows(quick: bool) -> list[Row]:
     found = []
     with tempfile.TemporaryDirectory() as folder:
         path = model(Path(folder), seconds)
-        for name, options in WAYS.items():
-            each = [latencies(path, options) for _ in range(rounds)]
-            for what, share, limit in (("median", 50.0, 0.3), ("99 % within", 99.0, 2.0)):
-                ms = sorted(1e3 * float(np.nanpercentile(lag, share)) for lag in each)
-                found.append(
-                    Row(
-                        f"`aoa --stream`, {name}, line in to line out: {what}",
-                        f"1 kHz, {seconds:g} s",
-                        "ms",
-                        Spread(ms[len(ms) // 2], ms[0], ms[-1]),
-                        at_most=limit,
-                    )
-                )
-            lost = float(sum(int(np.isnan(lag).sum()) for lag in each))
-            found.append(
-                Row(
-                    f"`aoa --stream`, {name}: rows without a line",
-                    f"1 kHz, {seconds:g} s",
-                    "1",
-                    Spread(lost, lost, lost),
-                )
+        each = [latencies(path) for _ in range(rounds)]
+    for what, share, limit in (("median", 50.0, 0.3), ("99 % within", 99.0, 2.0)):
+        ms = sorted(1e3 * float(np.nanpercentile(lag, share)) for lag in each)
+        found.append(
+            Row(
+                f"`aoa --stream`, line in to line out: {what}",
+                f"1 kHz, {seconds:g} s",
+                "ms",
+                Spread(ms[len(ms) // 2], ms[0], ms[-1]),
+                at_most=limit,
             )
+        )
+    lost = float(sum(int(np.isnan(lag).sum()) for lag in each))
+    found.append(
+        Row("`aoa --stream`: rows without a line", f"1 kHz, {seconds:g} s", "1", Spread(lost, lost, lost))
+    )
     return found
 
 

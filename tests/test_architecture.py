@@ -164,8 +164,8 @@ WITHIN = {
         "positions rate steps task figures"
     ),
     "aoa": (
-        "limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis reference result "
-        "simulate design foresight task runs figures"
+        "estimators limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis "
+        "reference result simulate design foresight estimation task runs figures"
     ),
     "selfcal": (
         "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "

@@ -1,5 +1,7 @@
 """Absurd measurements of the angle of attack: layouts, noise, motions and recordings that nobody would take."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from absurd import laws
@@ -7,6 +9,7 @@ from absurd.draws import Draws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
+from inercal.aoa.estimators import STATICS
 from inercal.aoa.result.columns import angles_record, points_record
 from inercal.aoa.result.tables import answer, delays, on_page, on_terminal, rest_of_fit, use_of_fit
 from inercal.aoa.settings import GYROS, Methods
@@ -62,17 +65,17 @@ def _run(done, draws):
     if draws.chance(0.1):
         _stream(done, record, settings)
         return
-    methods = None
     if draws.chance(0.3):
         methods = Methods(
-            draws.pick("segmented", "complementary", "improved", "difference", "gls"),
+            draws.pick(*STATICS),
             draws.pick("none", "low-pass", "mechanical", "decision"),
             draws.pick("none", "differentiated", "dual"),
         )
         done.words.append(repr(methods))
+        settings = replace(settings, methods=methods, estimator=replace(settings.estimator, kind="paper"))
     beside = draws.chance(0.02)
     done.words += ["compared"] if beside else []
-    found = measure(record, settings, methods, beside)
+    found = measure(record, settings, beside)
     estimate = found.estimate
     done.outcome = estimate.status.value
     done.wrong += laws.of_estimate(estimate)
@@ -82,7 +85,7 @@ def _run(done, draws):
     delays(estimate), use_of_fit(estimate), rest_of_fit(estimate)
     angles_record(found.recording, found.angles, found.settings)
     points_record(found.points, found.recording, found.settings)
-    if done.outcome == "ok" and not faults and methods is None and _obeyed(done.study):
+    if done.outcome == "ok" and not faults and found.filtered is not None and _obeyed(done.study):
         known = np.isfinite(found.angles.theta)
         off = np.remainder(found.angles.theta - simulated.theta + np.pi, 2.0 * np.pi) - np.pi
         done.wrong += laws.of_truth(off[known], found.angles.u[known], 0.0, ["theta"] * int(known.sum()))[:1]

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from inercal._files import read_bytes
 from inercal.errors import InputError
-from inercal.keys import keys_of
+from inercal.keys import in_place_of, keys_of
 from inercal.units import shown
 
 
@@ -65,7 +65,8 @@ def check(model: type[M], data: Mapping[str, Any], where: object, error: type[In
         first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
         cause = first.get("ctx", {}).get("error")
         if isinstance(cause, InputError):
-            raise error(where, f"{_dotted(first['loc'])}: {cause.message}") from problem
+            at = f"{_dotted(first['loc'])}: " if first["loc"] else ""
+            raise error(where, f"{at}{cause.message}") from problem
         raise error(where, _sentence(model, first)) from problem
     except InputError as problem:  # raised by a validator with its own words
         raise error(where, str(problem)) from problem
@@ -91,6 +92,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: unknown key, {hint}"
         case "missing":
             return f"{key}: missing, expected a value"
+        case "literal_error" if gone := in_place_of(key, str(value)):
+            return f"{key}: found {shown(value)}, {gone}"
         case "literal_error":
             return f"{key}: found {shown(value)}, expected {first['ctx']['expected']}"
         case "model_type" | "dict_type":

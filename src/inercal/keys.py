@@ -7,7 +7,7 @@ A field of a settings dataclass is made by `quantity`, `quantities` or `option`;
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,3 +137,16 @@ def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:
     for each in dataclasses.fields(settings):
         if key := each.metadata.get("key"):
             yield each, key
+
+
+GONE: Mapping[tuple[str, str], str] = {
+    ("static", "difference"): "complementary, the same angle once the dual accelerometer has made both axes equal",
+    ("static", "gls"): "the fusion, which weighs all axes by their errors",
+}  # fmt: skip
+"""Choices that versions up to 0.2.0 had, by key or option and choice: what to use in their place."""
+
+
+def in_place_of(key: str, choice: str) -> str | None:
+    """The end of a sentence on a ``choice`` of a key or option that is gone; None for one that never was."""
+    instead = GONE.get((key.rpartition(".")[2].removeprefix("--"), choice))
+    return None if instead is None else f"which is gone since 0.3.0, expected in its place {instead}"

@@ -1,8 +1,7 @@
-"""Where accelerometers sit best: bounds against closed forms and Monte Carlo, the search, the command."""
+"""Layouts of a model's sensors: bounds against closed forms and Monte Carlo, layouts side by side, the command."""
 
 import json
 import math
-import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -10,16 +9,17 @@ import pytest
 from sting_study import BASE, DEG, NOISE, G, layout, study
 
 import inercal as ic
-from inercal.aoa import design as designs
-from inercal.aoa.design import design, fusion_bound, sample_bound, study_tables
+from inercal.aoa.design import compare, courses_of, sample_bound, settled_u, undisturbed
 from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.layout import axes, tangential_arms
 from inercal.aoa.paper.residuals import error_terms
-from inercal.aoa.settings import Design, Goal, Noise, Prior
+from inercal.aoa.settings import Goal, Noise, Prior
 from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.cli import run
 from inercal.errors import StudyError
+from inercal.face.study import read_study
+from rows import for_each
 
 TINY = 1e-15
 WHITE = Noise(1e-4 * G, TINY, 0.2 * DEG, TINY)
@@ -95,7 +95,7 @@ def test_the_bound_of_the_fusion_is_that_of_many_runs():
     """Constants drawn from the prior, flexure none: the filter expects one, so errors are at most the bound, and no
     less than half of it; 16 runs, whose rms of about one degree of freedom each scatters by 0.18."""
     of = study(motion=QUICK)
-    bound, squares = fusion_bound(of, of.layout), []
+    bound, squares = settled_u(of, of.layout, undisturbed(of, of.layout)), []
     for seed in range(16):
         rng = np.random.default_rng([5, seed])
         prior = of.prior
@@ -112,40 +112,79 @@ def test_the_bound_of_the_fusion_is_that_of_many_runs():
     assert 0.4 < ratio < 1.0 + 4.0 * 0.18
 
 
-def test_exchange_finds_what_all_layouts_hold(monkeypatch):
-    of = study(motion=QUICK, design=Design(3, -0.2, 0.3, 4))
-    states = designs.courses_of(of)
-    spots = [
-        (angle, float(r)) for angle in (0.0, 0.5 * math.pi, -0.5 * math.pi) for r in np.linspace(-0.2, 0.3, 4)
-    ]
-    whole = designs._search(of, spots, 3, states)
-    monkeypatch.setattr(designs, "_MOST_LAYOUTS", 1)
-    assert designs._search(of, spots, 3, states)[0].sample == pytest.approx(whole[0].sample, rel=1e-6)
-
-
 def test_one_accelerometer_more_is_better():
+    """At the same places: a fourth one takes nothing of what three tell."""
     of = study(states=8, motion=QUICK, noise=WHITE, prior=EXACT)
-    spots = [(angle, float(r)) for angle in (0.0, -0.5 * math.pi) for r in np.linspace(-0.05, 0.4, 3)]
-    three, four = (designs._search(of, spots, count, designs.courses_of(of))[0].sample for count in (3, 4))
-    assert four < three
+    four = replace(
+        of.layout,
+        names=("a1", "a2", "a3", "a4"),
+        angle=np.append(of.layout.angle, 0.0),
+        r=np.append(of.layout.r, -0.05),
+        z=np.zeros(4),
+    )
+    by_three, by_four = (sample_bound(of, each, courses_of(of)) for each in (of.layout, four))
+    assert by_four < by_three
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """The stated layout, a short base line, and a fourth accelerometer."""
+    short = layout((0.05, 0.2, 0.25))
+    with_fourth = replace(
+        short,
+        names=("a1", "a2", "a3", "a4"),
+        angle=np.append(layout().angle, 0.0),
+        r=np.append(layout().r, -0.1),
+        z=np.zeros(4),
+    )
+    of = study(motion=QUICK, goal=Goal(0.03 * DEG), layouts={"short": short, "fourth": with_fourth})
+    return of, compare(of)
 
 
 @pytest.mark.slow
-def test_accelerometers_as_good_as_the_goal_asks_for():
-    of = study(motion=QUICK, design=Design(3, places=2), goal=Goal(0.02 * DEG))
-    found = design(of)
-    assert 1.0 < found.factor < 10.0
-    reached = fusion_bound(designs._times(of, found.factor), found.best.layout)
-    assert reached == pytest.approx(0.02 * DEG, rel=0.03)
-    assert found.result["accelerometer"] == pytest.approx(1e-4 * G * found.factor)
-    times, u = np.array(found.qualities).T
-    assert (np.diff(u) > 0.0).all()
-    assert u[times == pytest.approx(1.0)] == pytest.approx(found.best.fusion)
-    assert designs._factor(of, found.best.layout, 0.02 * DEG, found.qualities) == found.factor
-    never = design(replace(of, goal=Goal(1e-6 * DEG)))
-    assert math.isnan(never.factor)
+def test_layouts_side_by_side_are_each_as_if_stated(compared):
+    """Each has the bounds of a study whose [sensors] it is; u of the errors of its own sensors is below the prior."""
+    of, found = compared
+    assert [bound.name for bound in found.bounds] == ["stated", "short", "fourth"]
+    for bound in found.bounds:
+        (alone,) = compare(replace(of, layout=bound.layout, layouts={}, goal=Goal())).bounds
+        assert (alone.fusion, alone.sample) == (bound.fusion, bound.sample)
+        assert alone.sensors == bound.sensors
+        posed = problem(replace(of, layout=bound.layout))
+        prior = np.sqrt(np.diag(posed.covariance))
+        assert list(bound.sensors) == list(posed.nuisances)
+        for name, k in posed.nuisances.items():
+            assert 0.0 < bound.sensors[name] <= prior[k] * (1.0 + 1e-9)
+    stated, short, fourth = found.bounds
+    assert fourth.fusion < stated.fusion
+    assert short.sample > stated.sample
+    told = found.result["layouts"]
+    assert [layout["u"] for layout in told] == [bound.fusion for bound in found.bounds]
+    assert told[2]["sensors"][3] == {"name": "a4", "angle_rad": 0.0, "r_m": -0.1, "z_m": 0.0}
+    assert f"deg by {min(found.bounds, key=lambda bound: bound.fusion).name}" in found.message
+
+
+@pytest.mark.slow
+def test_accelerometers_as_good_as_the_goal_asks_for(compared):
+    """With that factor on noise and bias u is the wanted one; no accelerometers reach a goal far below."""
+    of, found = compared
+    stated = found.bounds[0]
+    assert 1.0 < stated.factor < 10.0
+    noise = of.noise
+    worse = replace(
+        noise,
+        accelerometer=noise.accelerometer * stated.factor,
+        accelerometer_bias=noise.accelerometer_bias * stated.factor,
+    )
+    reached = settled_u(replace(of, noise=worse), of.layout, undisturbed(of, of.layout))
+    assert reached == pytest.approx(0.03 * DEG, rel=0.03)
+    assert found.result["layouts"][0]["accelerometer"] == pytest.approx(noise.accelerometer * stated.factor)
+    never = compare(replace(of, goal=Goal(1e-6 * DEG), layouts={}))
+    assert math.isnan(never.bounds[0].factor)
+    assert never.result["layouts"][0]["accelerometer"] is None
     (missed,) = never.findings
     assert missed.code == "goal_missed"
+    assert never.message.endswith("are reached by none")
 
 
 STUDY = """
@@ -172,43 +211,61 @@ amplitude = "10 deg"
 frequency = "1 Hz"
 duration = "6 s"
 sample_rate = "100 Hz"
-[design]
-accelerometers = 3
-places = 3
-axes = ["+x", "+z", "-z"]
+[layouts.fourth]
+a2.axis = "+z"
+a3 = { angle = "10 deg", r = "5 cm", z = "1 cm" }
 """
 
 
+def test_a_layout_differs_from_the_sensors_where_it_says_so(tmp_path):
+    (tmp_path / "aoa.toml").write_text(STUDY)
+    settings = ic.study(tmp_path / "aoa.toml").settings
+    found = settings.layouts["fourth"]
+    assert found.names == ("a1", "a2", "a3")
+    np.testing.assert_allclose(np.degrees(found.angle), [90.0, -90.0, 10.0])
+    np.testing.assert_allclose(found.r, [-0.1, 0.2, 0.05])
+    np.testing.assert_allclose(found.z, [0.0, 0.0, 0.01])
+    np.testing.assert_allclose(np.degrees(settings.layout.angle), [90.0, 0.0])
+
+
 @pytest.mark.slow
-def test_the_command_writes_sensors_that_a_study_can_have(tmp_path, capsys):
+def test_the_command_compares(tmp_path, capsys):
     (tmp_path / "aoa.toml").write_text(STUDY)
     words = ["design", "aoa", str(tmp_path / "aoa.toml")]
-    assert (
-        run([*words, "--out", str(tmp_path / "sensors.toml"), "--report", str(tmp_path / "page.html")]) == 0
-    )
-    assert "as stated" in capsys.readouterr().out
-    assert "How u depends on base line and accelerometers" in (tmp_path / "page.html").read_text()
-    sensors = tomllib.loads((tmp_path / "sensors.toml").read_text())["sensors"]
-    assert sorted(sensors) == ["a1", "a2", "a3"]
-    head, _, tail = STUDY.partition("[sensors.a1]")
-    other = head + (tmp_path / "sensors.toml").read_text() + tail[tail.index("[sensors.gyro]") :]
-    (tmp_path / "best.toml").write_text(other)
-    assert len(ic.study(tmp_path / "best.toml").settings.layout.names) == 3
-    assert run([*words, "--json", "--set", "goal.theta=0.02 deg"]) == 0
-    told = json.loads(capsys.readouterr().out)["result"]
-    assert told["best"]["u"] <= told["stated"]["u"]
-    assert told["accelerometer"] > 0.0
+    assert run([*words, "--out", str(tmp_path / "all.toml"), "--report", str(tmp_path / "page.html")]) == 0
+    told = capsys.readouterr().out
+    assert "u, one sample [deg]" in told
+    assert "noise for the goal" not in told
+    page = (tmp_path / "page.html").read_text()
+    assert "Layouts side by side" in page
+    assert "Where the sensors are: fourth" in page
+    assert run([*words, "--json", "--set", "goal.theta=0.1 deg"]) == 0
+    stated, fourth = json.loads(capsys.readouterr().out)["result"]["layouts"]
+    assert (stated["name"], fourth["name"]) == ("stated", "fourth")
+    assert fourth["u"] < stated["u"]
+    assert fourth["accelerometer"] > stated["accelerometer"] > 0.0
+    assert set(fourth["predicted"]) - set(stated["predicted"]) == {"b_3", "dr_3", "zo_3"}
 
 
-def test_study_tables_of_any_axis():
-    assert 'axis = "-z"\nr = "-250 mm"' in study_tables(layout())
+@for_each(
+    ("key", "words"),
+    [
+        ('layouts.x.a4={axis="+x",r="1 cm"}', "layouts.x: found a4 without a3"),
+        ('layouts.x.a3.r="1 cm"', "layouts.x: a3: found neither axis nor angle"),
+        ('layouts.x.a2.axis="-z"', "layouts.x: found accelerometers whose axes are all parallel"),
+        ('layouts.x.a1.r="1 km"', "layouts.x.a1.r: found '1 km', that is 1000 m, expected a position"),
+        ('layouts.x.a1.bias="1 mg"', "layouts.x.a1.bias: unknown key"),
+        ('layouts.stated.a1.r="1 cm"', "layouts: found the name 'stated', expected one of 40 characters"),
+        ("design.places=3", "design: found, which is gone since 0.3.0, expected in its place [layouts.NAME]"),
+    ],
+)
+def test_refusals(key, words, tmp_path):
+    (tmp_path / "aoa.toml").write_text(STUDY.partition("[layouts")[0])
+    with pytest.raises(StudyError) as refused:
+        read_study("aoa", tmp_path / "aoa.toml", [key])
+    assert words in str(refused.value)
 
 
-def test_refusals(tmp_path):
+def test_a_comparison_needs_a_motion():
     with pytest.raises(StudyError, match=r"motion: missing"):
-        design(study(motion=None))
-    with pytest.raises(StudyError, match=r"design\.accelerometers: found 9, expected 8 at most"):
-        design(study(design=Design(9, places=2)))
-    (tmp_path / "aoa.toml").write_text(STUDY.replace("places = 3", 'places = 3\nrearmost = "1 m"'))
-    with pytest.raises(StudyError, match=r"design\.rearmost: found 1 m with foremost 0.25 m"):
-        ic.study(tmp_path / "aoa.toml")
+        compare(study(motion=None))

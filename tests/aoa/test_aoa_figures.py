@@ -16,7 +16,7 @@ from inercal.aoa.disturbances import Disturbances, Oscillation
 from inercal.aoa.figures import page as page_of
 from inercal.aoa.figures import pictures, sensors
 from inercal.aoa.figures.learned import consistency
-from inercal.aoa.settings import Attitude, Methods
+from inercal.aoa.settings import Attitude
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
 from inercal.report.over_time import Marks, Panel, gaps, measured, over_time, stretches, thinned
@@ -61,6 +61,11 @@ def recorded(settings):
 def measurement(settings, recording=None, **how):
     recording = recorded(settings) if recording is None else recording
     return measure(to_record(recording, settings), settings, **how)
+
+
+def by(kind, settings):
+    """The settings with another estimator."""
+    return replace(settings, estimator=replace(settings.estimator, kind=kind))
 
 
 def without_rows(recording, kept):
@@ -138,13 +143,13 @@ def test_sensors_against_the_reference_are_drawn_as_they_are():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("roll", "methods"), [(0.0, None), (60.0, None), (60.0, Methods())])
-def test_lever_arms_are_what_they_are_worth(roll, methods):
+@pytest.mark.parametrize(("roll", "kind"), [(0.0, "fusion"), (60.0, "fusion"), (60.0, "paper")])
+def test_lever_arms_are_what_they_are_worth(roll, kind):
     """Of theta = 30° + A sin(W t): r W^2 A^2 centrifugal and, at a roll of cosine c, c r W^2 A tangential, in mg and,
     over g, in degrees, whatever the method."""
     lies = Attitude(roll=Quantity(roll * DEG, 0.0, parse_unit("rad"), ""))
     settings = short(attitude=lies)
-    drawn = pictures(measurement(settings, methods=methods)) if roll else of_the_base()
+    drawn = pictures(measurement(by(kind, settings))) if roll else of_the_base()
     picture = by_title(drawn)["What lever arms add to the readings"]
     w, c = 2.0 * math.pi * BASE.frequency, math.cos(roll * DEG)
     for name, kind, size in (
@@ -237,7 +242,7 @@ def test_methods_side_by_side(known):
 
 def test_the_paper_s_way_has_angles_and_no_coefficients():
     settings = short()
-    drawn = by_title(pictures(measurement(settings, methods=Methods())))
+    drawn = by_title(pictures(measurement(by("paper", settings))))
     assert not {"Flexure of the sting", "What was learned of the sensors"} & set(drawn)
     assert "improved, mechanical, dual" in " ".join(texts(drawn["Angle, its uncertainty, and its rate"]))
     assert "tangential" in " ".join(texts(drawn["What lever arms add to the readings"]))

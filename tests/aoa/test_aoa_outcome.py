@@ -13,7 +13,7 @@ from inercal.aoa.fusion.filter_result import estimate
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reading.wind_off_zero import with_zero
 from inercal.aoa.result.budget import parts
-from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.outcome import assemble, assemble_angles
 from inercal.aoa.result.systematic import by_fusion, by_methods
 from inercal.aoa.result.verification import errors
 from inercal.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
@@ -287,7 +287,7 @@ def test_a_paper_method_has_angles_and_no_coefficients():
     made = simulate(settings, np.random.default_rng(3)).recording
     u = np.full(6000, 0.01 * DEG)
     angles = Angles("improved, mechanical, dual", made.reference, u, made.gyro, u)
-    result = assemble_paper(made, settings, angles, [], None)
+    result = assemble_angles(made, settings, angles, [], None)
     assert result.status is Status.OK
     assert result.names == ()
     assert result.covariance.shape == (0, 0)
@@ -295,7 +295,7 @@ def test_a_paper_method_has_angles_and_no_coefficients():
     assert result.result["angle"]["u"]["median"] == pytest.approx(0.01 * DEG)
     assert "yaw" in result.model
     none = replace(angles, theta=np.full(6000, np.nan))
-    assert assemble_paper(made, settings, none, [], None).status is Status.NOT_CONVERGED
+    assert assemble_angles(made, settings, none, [], None).status is Status.NOT_CONVERGED
 
 
 def test_a_zero_lowers_u_of_the_angle():

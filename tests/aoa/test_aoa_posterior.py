@@ -13,7 +13,7 @@ from inercal.aoa.layout import Layout
 from inercal.aoa.reference.corrections import corrected as put_right
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected, load
-from inercal.aoa.result.outcome import assemble, assemble_paper
+from inercal.aoa.result.outcome import assemble, assemble_angles
 from inercal.aoa.settings import Calibration, MotionPlan
 from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.errors import InputError, StudyError
@@ -191,7 +191,7 @@ def test_other_results_are_refused(saved, tmp_path):
             Estimate.without(Basis("aoa"), Status.INCONSISTENT, "mean NIS 9"),
             r"ended inconsistent \(mean NIS 9\)",
         ),
-        (assemble_paper(made, settings, of_fusion(found, 19), [], None), "holds no coefficients"),
+        (assemble_angles(made, settings, of_fusion(found, 19), [], None), "holds no coefficients"),
     ):
         save(result, tmp_path / "other.json")
         with pytest.raises(StudyError, match=words):

@@ -15,7 +15,7 @@ from inercal.aoa.fusion.problem import problem
 from inercal.aoa.reference.corrections import report_of
 from inercal.aoa.reference.sensor_fit import fit
 from inercal.aoa.result.carry_over import corrected
-from inercal.aoa.result.outcome import assemble, assemble_paper, term_of
+from inercal.aoa.result.outcome import assemble, assemble_angles, term_of
 from inercal.aoa.result.points import points
 from inercal.aoa.result.tables import (
     angle,
@@ -258,12 +258,12 @@ def test_all_tables_of_the_fusion_and_of_a_paper_method(shown):
     made = simulate(settings, np.random.default_rng(4)).recording
     u = np.full(len(made.t), 0.01 * DEG)
     angles = Angles("improved, mechanical, dual", made.reference, u, made.gyro, u)
-    plain = assemble_paper(made, settings, angles, [], None)
+    plain = assemble_angles(made, settings, angles, [], None)
     assert [each.title for each in answer(plain, (), settings)] == ["Angle"]
     assert on_page(plain) == on_terminal(plain) == []
     none = replace(
         angles, theta=np.full(len(made.t), np.nan), rate=np.full(len(made.t), np.nan), u=u * np.nan
     )
-    empty = assemble_paper(made, settings, none, [], None)
+    empty = assemble_angles(made, settings, none, [], None)
     assert "–" in angle(empty).text()
     assert delays(empty) == ""

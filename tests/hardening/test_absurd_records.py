@@ -112,7 +112,7 @@ COMMANDS = {
         "apply cal.json log.csv --stream", "calibrate imu log.csv --study imu.toml", "temperature log.csv",
         "new imu log.csv --out NEW.toml",
     ],
-    "model.csv": ["aoa model.csv --study aoa.toml", "aoa model.csv --study aoa.toml --static gls",
+    "model.csv": ["aoa model.csv --study aoa.toml", "aoa model.csv --study aoa.toml --static improved",
                   "aoa model.csv --study aoa.toml --stream", "inspect model.csv"],
     "unit.csv": ["calibrate strapdown unit.csv --study strapdown.toml"],
     "table.csv": ["calibrate turntable table.csv --study turntable.toml"],

@@ -66,7 +66,7 @@ COMMANDS = {
     "design positions": "design positions turntable.toml --out NEW.json",
     "design selfcal": f"design selfcal selfcal.toml {SMALL} --out NEW.json",
     "design strapdown": "design strapdown strapdown.toml --out NEW.json",
-    "design aoa": "design aoa aoa.toml --set design.places=2 --set motion.duration='4 s' --out NEW.json",
+    "design aoa": "design aoa aoa.toml --set motion.duration='4 s' --out NEW.json",
     "design tolerances": "design tolerances turntable.toml --set goal.DX_F='10 deg/h' --out NEW.json",
     "simulate imu": "simulate imu imu.toml --set site.latitude='39.1 deg' --out NEW.csv",
     "simulate strapdown": "simulate strapdown strapdown.toml --out NEW.csv",

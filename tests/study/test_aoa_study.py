@@ -82,8 +82,8 @@ def test_all_that_settings_hold_is_reached():
             "axial": {"level": "1 mg"},
         },
         timing={"gyro_delay": "-2 ms", "common_delay": "1 ms"},
-        estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9},
-        methods={"static": "gls", "centrifugal": "low-pass", "tangential": "none"},
+        estimator={"states": 8, "smooth": True, "snap": "2e6 rad^2/s^7", "gate": 9, "kind": "paper"},
+        methods={"static": "complementary", "centrifugal": "low-pass", "tangential": "none"},
         model={"roll": "2.0(1) deg", "yaw": "-1 deg"},
         flow={"upwash": "0.10(2) deg", "sidewash": "1 mrad"},
         zero={"start": "1 s", "end": "5 s", "angle": "0.50(1) deg"},
@@ -114,8 +114,8 @@ def test_all_that_settings_hold_is_reached():
     assert (prior.axial.frequency, prior.axial.level) == pytest.approx((12 * two_pi, 1e-3 * G))
     assert (found.timing.gyro_delay, found.timing.common_delay) == pytest.approx((-2e-3, 1e-3))
     assert found.timing.common_delay_u == 0.0
-    assert found.estimator == Estimator(8, True, None, 2e6, 9.0)
-    assert found.methods == Methods("gls", "low-pass", "none")
+    assert found.estimator == Estimator(8, True, None, 2e6, 9.0, "paper")
+    assert found.methods == Methods("complementary", "low-pass", "none")
     of = found.attitude
     assert (of.roll.value, of.roll.u, of.yaw.value) == pytest.approx((2 * DEG, 0.1 * DEG, -DEG))
     assert (of.upwash.u, of.sidewash.value) == pytest.approx((0.02 * DEG, 1e-3))
@@ -217,6 +217,7 @@ REFUSED = {
     "estimator.gate=wide": "estimator.gate: found 'wide'",
     "estimator.smooth=yes": "estimator.smooth: found 'yes', expected true or false",
     "methods.static=best": "methods.static: found 'best', expected 'segmented'",
+    "methods.static=gls": "methods.static: found 'gls', which is gone since 0.3.0, expected in its place the fusion",
     "model.roll=200 deg": "model.roll: .*from -180 deg to 180 deg",
     "flow.upwash=50 deg": "flow.upwash: .*from -45 deg to 45 deg",
     'zero={start = "0 s", end = "5 s", angle = "0 deg"}': "zero.angle: found '0 deg', expected it with its standard",

@@ -177,6 +177,23 @@ async def test_a_test_is_planned_from_its_kind_to_its_uncertainties(user, bench)
 
 @pytest.mark.slow
 @of_user
+async def test_layouts_of_a_model_are_set_side_by_side(user, bench):
+    """There is no plan to be found, and so none to be taken."""
+    session = bench.sessions.begin_with("sting")
+    bench.change(session, "layouts.short.a1", '{ r = "-0.1 m" }')
+    await user.open(f"/sessions/{session.id}/design")
+    await user.should_see("values are predicted", retries=100)
+    user.find("Compare").click()
+    await user.should_see("The comparison (job", retries=20)
+    ended = await asyncio.to_thread(bench.queue.wait, bench.last_design(session).id, 120.0)
+    assert ended.state is State.DONE, ended.said
+    await user.should_see("is done", retries=40)
+    await user.should_not_see("Take the plan found")
+    assert "Layouts side by side" in ended.report.read_text()
+
+
+@pytest.mark.slow
+@of_user
 async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench):
     session = bench.sessions.begin_with("ferraris-si")
     job = await run(bench, session)

@@ -64,9 +64,6 @@ def test_what_a_search_wrote_becomes_the_plan(study):
     found = '# found\n[plan]\nturns = [\n    ["x", "30 deg"],\n]\nrate = "2 deg/s"\n'
     plan = study("selfcal", with_found("selfcal", (FOLDER / "selfcal.toml").read_text(), found)).settings.plan
     np.testing.assert_allclose(np.degrees([plan.rate, plan.moves[0].angle]), [2.0, 30.0])
-    found = '[sensors.a1]\naxis = "+x"\nr = "10 mm"\n\n[sensors.a2]\naxis = "+z"\nr = "20 mm"\n'
-    layout = study("aoa", with_found("aoa", (FOLDER / "sting.toml").read_text(), found)).settings.layout
-    np.testing.assert_allclose(layout.r, [0.01, 0.02])
 
 
 def test_a_value_over_several_lines_is_changed_as_a_whole():

@@ -1,4 +1,4 @@
-"""Design of the sensors of a model: where n accelerometers sit and look best, and how good they must be.
+"""Layouts of the sensors of a model before it is built: what each can tell of the angle, and how good it must be.
 
 Two bounds, along the motion of the study. Sample by sample, as the paper works, the readings of one row tell the angle
 and the angular acceleration: with the covariance C of their errors (`inercal.aoa.paper.residuals.error_terms`), h their
@@ -8,29 +8,27 @@ slopes by the angle and p by the angular acceleration (the arms),
 
 which no unbiased estimate from one row betters. For the axes -z, +x, +z it holds that of the paper: the angular
 acceleration is known to sqrt(2) dA / L, so that the base line L matters. With a filter: the covariance of the fusion
-along the motion without noise, where it is linearised at the truth, which is the bound of Cramer and Rao for its model.
-
-The search takes the first bound of all layouts (or exchanges one accelerometer after another, where they are too many),
-and ranks the best of them by the second.
+along the motion without noise, where it is linearised at the truth, which is the bound of Cramer and Rao for its model,
+for the angle and for the errors of the sensors.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from inercal.aoa.fusion.filter_result import estimate
+from inercal.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import AXES, Layout, axes, tangential_arms
+from inercal.aoa.layout import AXES, STATED, Layout, axes, tangential_arms
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.motion import course, duration
 from inercal.aoa.paper.residuals import error_terms
 from inercal.aoa.reading.recording import Recording
+from inercal.aoa.result.outcome import term_of
 from inercal.aoa.settings import AoaSettings
 from inercal.aoa.simulate import simulate
 from inercal.arrays import Array
@@ -38,6 +36,7 @@ from inercal.errors import StudyError
 from inercal.estimate.rounding import short
 from inercal.estimate.table import Table, heads
 from inercal.findings import Finding
+from inercal.instruments.terms import shown_unit
 from inercal.units import STANDARD_GRAVITY
 
 REFERENCES = (
@@ -49,12 +48,6 @@ REFERENCES = (
 _ROWS = 40
 """Instants of the motion at which the bound of a sample is taken."""
 
-_MOST_LAYOUTS = 8000
-"""Layouts up to which all are tried."""
-
-_RANKED = 6
-"""Layouts that are ranked by the bound of the fusion."""
-
 _LONGEST = 20.0
 """Time [s] of the motion along which the fusion's bound is computed."""
 
@@ -62,102 +55,122 @@ _NO_NOISE = 1e-9
 """Part of the noise that is left in a recording for the bound."""
 
 _FACTORS = (1e-2, 1e2)
-"""Accelerometers that are looked at: times better and worse than stated."""
+"""Accelerometers that are looked at: times the stated noise and bias, from the best to the worst."""
 
-_QUALITIES = 13
-"""So many of them."""
-
-_BASE_LINES = (0.1, 0.25, 0.5, 0.75, 1.0)
-"""Parts of the best layout's positions whose bounds are shown."""
+_CLOSE = 0.02
+"""Relative error of the factor by which accelerometers may be worse."""
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """A layout with its bounds [rad]: ``sample`` rms over the motion, ``fusion`` rms after it settled; NaN if not
-    computed."""
+class Bound:
+    """The least u that a layout by its ``name`` can have.
 
-    layout: Layout
-    sample: float
-    fusion: float = math.nan
-
-
-@dataclass(frozen=True, eq=False)
-class Designed:
-    """The ``best`` of the layouts, the ``stated`` one of the study, and the ``ranked`` ones.
-
-    ``factor``: times the stated noise and bias of the accelerometers with which the best layout reaches the wanted u;
-    NaN without a goal, or where none reaches it. ``base_lines``: parts of the best positions, and the bounds there.
-    ``qualities``: times the stated noise and bias of the accelerometers, and u [rad] of the best layout by the fusion.
+    ``sample`` and ``fusion`` [rad]: of the angle, rms over the motion from single samples, and by the fusion after it
+    settled. ``sensors`` [SI]: of the errors of the sensors at the end of the motion, by name. ``factor``: largest
+    factor on noise and bias of the accelerometers with which the fusion reaches the goal, 100 at most; NaN without a
+    goal, or where a hundredth does not reach it.
     """
 
-    best: Candidate
-    stated: Candidate
-    ranked: tuple[Candidate, ...]
-    base_lines: tuple[tuple[float, Candidate], ...]
-    qualities: tuple[tuple[float, float], ...]
-    factor: float
+    name: str
+    layout: Layout
+    sample: float
+    fusion: float
+    sensors: dict[str, float]
+    factor: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The ``bounds`` of layouts side by side, that under [sensors] first."""
+
+    bounds: tuple[Bound, ...]
     message: str
     result: dict[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
     def tables(self) -> list[Table]:
-        """Layouts by rank with the stated one, and the base lines."""
-        rows = [("best", *_cells(self.best))]
-        rows += [(f"{k}.", *_cells(each)) for k, each in enumerate(self.ranked[1:], start=2)]
-        rows.append(("as stated", *_cells(self.stated)))
-        columns = heads("", "accelerometers", "u, fusion [deg]", "u, one sample [deg]")
+        """Layouts with u of the angle, and u of the errors of the sensors, a column for each layout."""
+        goal = self.result["wanted"] is not None
+        wanted = ("noise for the goal [ug]", "bias for the goal [ug]") if goal else ()
+        columns = heads("layout", "accelerometers", "u, fusion [deg]", "u, one sample [deg]", *wanted)
+        rows = [
+            (bound.name, _words(bound.layout), _deg(bound.fusion), _deg(bound.sample))
+            + ((_ug(told["accelerometer"]), _ug(told["accelerometer_bias"])) if goal else ())
+            for bound, told in zip(self.bounds, self.result["layouts"], strict=True)
+        ]
         caption = (
-            "u of the angle along the motion, by the fusion and from single samples, with the stated sensors."
+            "u of the angle along the motion, by the fusion and from single samples, with the stated sensors"
+            + (
+                "; noise and bias of the accelerometers with which the fusion reaches the goal."
+                if goal
+                else "."
+            )
         )
-        lines = [(f"{part:g}", _deg(each.fusion), _deg(each.sample)) for part, each in self.base_lines]
-        of_lines = heads("positions times", "u, fusion [deg]", "u, one sample [deg]")
+        names = dict.fromkeys(name for bound in self.bounds for name in bound.sensors)
+        of_sensors = [_row(name, [bound.sensors.get(name) for bound in self.bounds]) for name in names]
         return [
             Table("Layouts", caption, columns, tuple(rows), 2),
-            Table("Base line", "The best layout drawn in towards the pivot.", of_lines, tuple(lines), 1),
+            Table(
+                "Errors of the sensors",
+                "Their u at the end of the motion, by the fusion.",
+                heads("", "unit", *(bound.name for bound in self.bounds)),
+                tuple(of_sensors),
+                2,
+            ),
         ]
 
 
-def design(settings: AoaSettings, progress: Callable[[str], None] = lambda _: None) -> Designed:
-    """The best layout of the accelerometers that the study's design asks for.
+def compare(settings: AoaSettings, progress: Callable[[str], None] = lambda _: None) -> Compared:
+    """The bounds of the layout that the study states, and of those beside it; raises `StudyError` without a motion."""
+    if settings.motion is None:
+        raise StudyError("motion", "missing, expected the motion to judge the layouts by")
+    states, bounds = courses_of(settings), []
+    for name, layout in {STATED: settings.layout, **settings.layouts}.items():
+        progress(f"layout {name}")
+        bounds.append(_bound(settings, name, layout, states))
+    wanted, findings = settings.goal.theta, tuple[Finding, ...]()
+    least = min(bounds, key=lambda bound: bound.fusion)
+    message = f"u {_deg(bounds[0].fusion)} deg as stated"
+    if least is not bounds[0]:
+        message += f", {_deg(least.fusion)} deg by {least.name}"
+    if wanted is not None:
+        reaching = [bound.name for bound in bounds if bound.factor >= 1.0]
+        message += f"; the wanted {_deg(wanted)} deg are reached by {', '.join(reaching) or 'none'}"
+        if all(math.isnan(bound.factor) for bound in bounds):
+            findings = (_missed(settings, least.layout, wanted),)
+    noise = settings.noise
+    result = {
+        "wanted": wanted,
+        "layouts": [
+            {
+                "name": bound.name,
+                "sensors": _places(bound.layout),
+                "u": _finite(bound.fusion),
+                "u_sample": _finite(bound.sample),
+                "predicted": bound.sensors,
+                "accelerometer": _finite(noise.accelerometer * bound.factor),
+                "accelerometer_bias": _finite(noise.accelerometer_bias * bound.factor),
+            }
+            for bound in bounds
+        ],
+    }
+    return Compared(tuple(bounds), message, result, findings)
 
-    Raises `StudyError` without a motion, or where no layout shows the angle.
-    """
-    plan, motion = settings.design, settings.motion
-    if motion is None:
-        raise StudyError("motion", "missing, expected the motion to design the sensors for")
-    count = plan.accelerometers or len(settings.layout.names)
-    states = courses_of(settings)
-    places = np.linspace(plan.rearmost, plan.foremost, plan.places)
-    spots = [(AXES[axis], float(r)) for axis in plan.axes for r in places]
-    if count > len(spots):
-        raise StudyError(
-            "design.accelerometers", f"found {count}, expected {len(spots)} at most: axes times places"
-        )
-    progress("trying layouts")
-    found = _search(settings, spots, count, states)
-    if not found:
-        raise StudyError("design", "found no layout that shows the angle, expected more places or axes")
-    progress("bounds of the fusion")
-    ranked = sorted(
-        (replace(each, fusion=fusion_bound(settings, each.layout)) for each in found[:_RANKED]),
-        key=lambda each: each.fusion,
+
+def _bound(settings: AoaSettings, name: str, layout: Layout, states: tuple[Array, Array, Array]) -> Bound:
+    """The bound of a layout."""
+    recording = undisturbed(settings, layout)
+    filtered = _fused(settings, layout, recording)
+    nuisances = problem(replace(settings, layout=layout)).nuisances
+    u = np.sqrt(np.diag(filtered.state.P))
+    return Bound(
+        name,
+        layout,
+        sample_bound(settings, layout, states),
+        _settled(filtered, recording),
+        {coefficient: float(u[k]) for coefficient, k in nuisances.items()},
+        _factor(settings, layout, recording),
     )
-    best = ranked[0]
-    stated = Candidate(
-        settings.layout,
-        sample_bound(settings, settings.layout, states),
-        fusion_bound(settings, settings.layout),
-    )
-    lines = []
-    for part in _BASE_LINES:
-        drawn = replace(best.layout, r=best.layout.r * part)
-        lines.append(
-            (part, Candidate(drawn, sample_bound(settings, drawn, states), fusion_bound(settings, drawn)))
-        )
-    progress("how good they must be")
-    factors = np.geomspace(*_FACTORS, _QUALITIES).tolist()
-    qualities = tuple((each, fusion_bound(_times(settings, each), best.layout)) for each in factors)
-    return _designed(settings, best, stated, tuple(ranked), tuple(lines), qualities)
 
 
 def sample_bound(settings: AoaSettings, layout: Layout, states: tuple[Array, Array, Array]) -> float:
@@ -181,11 +194,6 @@ def sample_bound(settings: AoaSettings, layout: Layout, states: tuple[Array, Arr
     return math.sqrt(float(u2.mean()))
 
 
-def fusion_bound(settings: AoaSettings, layout: Layout) -> float:
-    """Rms u [rad] of the angle by the fusion along the study's motion, of 20 s at most, after it settled."""
-    return settled_u(settings, layout, undisturbed(settings, layout))
-
-
 def undisturbed(settings: AoaSettings, layout: Layout) -> Recording:
     """The study's motion, of 20 s at most, as sensors without noise would record it."""
     assert settings.motion is not None
@@ -206,9 +214,18 @@ def undisturbed(settings: AoaSettings, layout: Layout) -> Recording:
 
 def settled_u(settings: AoaSettings, layout: Layout, recording: Recording) -> float:
     """Rms u [rad] of the angle by the fusion along a recording without noise, after it settled."""
+    return _settled(_fused(settings, layout, recording), recording)
+
+
+def _fused(settings: AoaSettings, layout: Layout, recording: Recording) -> FilterResult:
+    """The fusion along a recording without noise."""
     # a bound holds nothing back
     of = replace(settings, layout=layout, estimator=replace(settings.estimator, gate=math.inf))
-    filtered = estimate(recording, problem(of), settings.estimator.smooth)
+    return estimate(recording, problem(of), settings.estimator.smooth)
+
+
+def _settled(filtered: FilterResult, recording: Recording) -> float:
+    """Rms u [rad] of the angle after the fusion settled; inf where it has none."""
     u = filtered.u[(recording.t >= LIMITS.settling_time) & np.isfinite(filtered.u)]
     return math.sqrt(float(np.mean(np.square(u)))) if len(u) else math.inf
 
@@ -220,168 +237,78 @@ def courses_of(settings: AoaSettings) -> tuple[Array, Array, Array]:
     return course(settings.motion, np.random.default_rng(0))(t)
 
 
-def _layout(spots: Iterable[tuple[float, float]]) -> Layout:
-    """Accelerometers at (axis, position)."""
-    angle, r = np.array(list(spots)).T
-    return Layout(tuple(f"a{k}" for k in range(1, len(r) + 1)), angle, r, np.zeros(len(r)))
-
-
-def _search(
-    settings: AoaSettings,
-    spots: Sequence[tuple[float, float]],
-    count: int,
-    states: tuple[Array, Array, Array],
-) -> list[Candidate]:
-    """Layouts by the bound of a sample, the best first."""
-    if math.comb(len(spots), count) <= _MOST_LAYOUTS:
-        chosen: Iterable[tuple[int, ...]] = combinations(range(len(spots)), count)
-    else:
-        chosen = _exchanged(settings, spots, count, states)
-    found = []
-    for each in chosen:
-        layout = _layout(spots[k] for k in each)
-        if layout.spans:
-            bound = sample_bound(settings, layout, states)
-            if math.isfinite(bound):
-                found.append(Candidate(layout, bound))
-    return sorted(found, key=lambda each: each.sample)
-
-
-def _exchanged(
-    settings: AoaSettings,
-    spots: Sequence[tuple[float, float]],
-    count: int,
-    states: tuple[Array, Array, Array],
-) -> list[tuple[int, ...]]:
-    """Layouts at which no exchange of one accelerometer helps, from random starts."""
-    rng, ends = np.random.default_rng(0), set()
-
-    def bound(chosen: Sequence[int]) -> float:
-        layout = _layout(spots[k] for k in chosen)
-        return sample_bound(settings, layout, states) if layout.spans else math.inf
-
-    for _ in range(_RANKED):
-        chosen = [int(k) for k in rng.choice(len(spots), count, replace=False)]
-        value, better = bound(chosen), True
-        while better:
-            better = False
-            for place in range(count):
-                for other in range(len(spots)):
-                    if other in chosen:
-                        continue
-                    changed = [*chosen[:place], other, *chosen[place + 1 :]]
-                    if (trial := bound(changed)) < value * (1.0 - 1e-9):
-                        chosen, value, better = changed, trial, True
-        ends.add(tuple(sorted(chosen)))
-    return sorted(ends)
-
-
-def _designed(
-    settings: AoaSettings,
-    best: Candidate,
-    stated: Candidate,
-    ranked: tuple[Candidate, ...],
-    lines: tuple[tuple[float, Candidate], ...],
-    qualities: tuple[tuple[float, float], ...],
-) -> Designed:
-    """The design with its words; how good the sensors must be, where the study wants a u."""
-    wanted, noise = settings.goal.theta, settings.noise
-    factor, findings = math.nan, []
-    words = f"{_words(best.layout)}: u {_deg(best.fusion)} deg, as stated {_deg(stated.fusion)} deg"
-    if wanted is not None:
-        factor = _factor(settings, best.layout, wanted, qualities)
-        if math.isnan(factor):
-            left = min(u for _, u in qualities)
-            text = (
-                f"no accelerometers reach the wanted {_deg(wanted)} deg: with perfect ones {_deg(left)} deg are "
-                "left, of positions, gyro and motion: state these better under [prior] and [noise]"
-            )
-            findings.append(Finding("goal_missed", text))
-        else:
-            words += (
-                f"; for {_deg(wanted)} deg noise of {_ug(noise.accelerometer * factor)} and bias of "
-                f"{_ug(noise.accelerometer_bias * factor)}"
-            )
-    result = {
-        "wanted": wanted,
-        "best": _record(best),
-        "stated": _record(stated),
-        "ranked": [_record(each) for each in ranked],
-        "base_lines": [{"part": part, **_record(each)} for part, each in lines],
-        "qualities": [{"times": times, "u": _finite(u)} for times, u in qualities],
-        "accelerometer": None if math.isnan(factor) else noise.accelerometer * factor,
-        "accelerometer_bias": None if math.isnan(factor) else noise.accelerometer_bias * factor,
-    }
-    return Designed(best, stated, ranked, lines, qualities, factor, words, result, tuple(findings))
-
-
-def _factor(
-    settings: AoaSettings, layout: Layout, wanted: float, qualities: Sequence[tuple[float, float]]
-) -> float:
+def _factor(settings: AoaSettings, layout: Layout, recording: Recording) -> float:
     """Largest factor on noise and bias of the accelerometers at which the fusion knows the angle as wanted; NaN where
-    none does."""
-    reached = [k for k, (_, u) in enumerate(qualities) if u <= wanted]
-    if not reached:
+    none does, or nothing is wanted."""
+    from scipy.optimize import brentq
+
+    wanted = settings.goal.theta
+    if wanted is None:
         return math.nan
-    last = reached[-1]
-    if last == len(qualities) - 1:
-        return qualities[-1][0]
-    low, high = math.log(qualities[last][0]), math.log(qualities[last + 1][0])
-    while high - low > 0.02:
-        middle = 0.5 * (low + high)
-        if fusion_bound(_times(settings, math.exp(middle)), layout) <= wanted:
-            low = middle
-        else:
-            high = middle
-    return math.exp(low)
+
+    def beyond(logarithm: float) -> float:
+        """Logarithm of u over the wanted u, finite for a root."""
+        u = settled_u(_times(settings, math.exp(logarithm)), layout, recording)
+        return math.log(min(u, 1e9) / wanted)
+
+    low, high = map(math.log, _FACTORS)
+    if beyond(low) > 0.0:
+        return math.nan
+    if beyond(high) <= 0.0:
+        return _FACTORS[1]
+    return math.exp(brentq(beyond, low, high, xtol=_CLOSE))
 
 
 def _times(settings: AoaSettings, factor: float) -> AoaSettings:
     """The study with accelerometers so many times worse."""
     noise = settings.noise
-    return replace(
-        settings,
-        noise=replace(
-            noise,
-            accelerometer=noise.accelerometer * factor,
-            accelerometer_bias=noise.accelerometer_bias * factor,
-        ),
+    worse = replace(
+        noise,
+        accelerometer=noise.accelerometer * factor,
+        accelerometer_bias=noise.accelerometer_bias * factor,
     )
+    return replace(settings, noise=worse)
 
 
-def study_tables(layout: Layout) -> str:
-    """A layout as the tables of a study."""
-    lines = []
-    for name, angle, r in zip(layout.names, layout.angle.tolist(), layout.r.tolist(), strict=True):
-        lines += [f"[sensors.{name}]", f'axis = "{_axis(angle)}"', f'r = "{1e3 * r:.10g} mm"', ""]
-    return "\n".join(lines)
+def _missed(settings: AoaSettings, layout: Layout, wanted: float) -> Finding:
+    """The finding on a goal that no accelerometers reach."""
+    left = settled_u(_times(settings, _FACTORS[0]), layout, undisturbed(settings, layout))
+    text = (
+        f"no accelerometers reach the wanted {_deg(wanted)} deg: with perfect ones {_deg(left)} deg are left, of "
+        "positions, gyro and motion: state these better under [prior] and [noise]"
+    )
+    return Finding("goal_missed", text)
 
 
-def _record(of: Candidate) -> dict[str, Any]:
-    """A layout in a result."""
-    each = zip(of.layout.angle.tolist(), of.layout.r.tolist(), of.layout.z.tolist(), strict=True)
-    sensors = [{"angle_rad": angle, "r_m": r, "z_m": z} for angle, r, z in each]
-    return {"sensors": sensors, "u": _finite(of.fusion), "u_sample": _finite(of.sample)}
+def _places(layout: Layout) -> list[dict[str, Any]]:
+    """The accelerometers of a layout, for a result."""
+    columns = zip(layout.names, layout.angle.tolist(), layout.r.tolist(), layout.z.tolist(), strict=True)
+    return [{"name": name, "angle_rad": angle, "r_m": r, "z_m": z} for name, angle, r, z in columns]
 
 
 def _finite(value: float) -> float | None:
+    """The value; None for one that is not known."""
     return value if math.isfinite(value) else None
 
 
-def _cells(of: Candidate) -> tuple[str, str, str]:
-    return _words(of.layout), _deg(of.fusion), _deg(of.sample)
+def _row(name: str, values: list[float | None]) -> tuple[str, ...]:
+    """An error of a sensor with its u [SI] in each layout, a dash where that has not this sensor."""
+    unit, size = shown_unit(term_of(name).unit)
+    return name, unit, *("–" if u is None else short(u / size) for u in values)
 
 
 def _words(layout: Layout) -> str:
-    """A layout in words: ``-z -250 mm, +x 0 mm``."""
-    each = zip(layout.angle.tolist(), layout.r.tolist(), strict=True)
-    return ", ".join(f"{_axis(angle)} {1e3 * r:.4g} mm" for angle, r in each)
+    """A layout in words: ``-z -250 mm, +x 0 mm``, heights where there are any."""
+    places = zip(layout.angle.tolist(), layout.r.tolist(), layout.z.tolist(), strict=True)
+    return ", ".join(
+        f"{_axis(angle)} {1e3 * r:.4g} mm" + (f" z {1e3 * z:.4g} mm" if z else "") for angle, r, z in places
+    )
 
 
 def _axis(angle: float) -> str:
     """The name of an axis, or its angle."""
-    for name, of in AXES.items():
-        if abs(math.remainder(angle - of, 2.0 * math.pi)) < 1e-9:
+    for name, direction in AXES.items():
+        if abs(math.remainder(angle - direction, 2.0 * math.pi)) < 1e-9:
             return name
     return f"{math.degrees(angle):.4g} deg"
 
@@ -391,6 +318,6 @@ def _deg(value: float) -> str:
     return short(math.degrees(value)) if math.isfinite(value) else "–"
 
 
-def _ug(value: float) -> str:
-    """An acceleration in g."""
-    return f"{1e6 * value / STANDARD_GRAVITY:.3g} ug"
+def _ug(value: float | None) -> str:
+    """An acceleration [m/s^2] in ug, a dash where there is none."""
+    return "–" if value is None else f"{1e6 * value / STANDARD_GRAVITY:.3g}"

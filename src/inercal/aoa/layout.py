@@ -22,6 +22,9 @@ from inercal.geometry.rotations import principal
 #: text of an axis -> lambda [rad], counted from +x (forward) towards -z (down)
 AXES = {"+x": 0.0, "-z": 0.5 * math.pi, "-x": math.pi, "+z": -0.5 * math.pi}
 
+STATED = "stated"
+"""Name of the layout under [sensors] of a study, where others stand beside it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Layout:

@@ -13,7 +13,8 @@ import numpy as np
 from inercal.aoa.alarm import Alarm
 from inercal.aoa.band import Band
 from inercal.aoa.disturbances import SIZE, Disturbances
-from inercal.aoa.layout import AXES, Layout
+from inercal.aoa.estimators import WORDS, Centrifugal, EstimatorKind, States, Static, Tangential
+from inercal.aoa.layout import Layout
 from inercal.aoa.limits import LIMITS
 from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
@@ -30,16 +31,9 @@ from inercal.keys import (
 )
 from inercal.units import STANDARD_GRAVITY, Quantity
 
-States = Literal[8, 11, 15, 19]
-Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
-Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
-Tangential = Literal["none", "differentiated", "dual"]
 Per = Literal["1", "V", "count"]
 PointsBy = Literal["auto", "point", "trigger", "pause"]
-AxisName = Literal["+x", "-x", "+z", "-z"]
 MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
-
-STATES: tuple[States, ...] = (8, 11, 15, 19)
 
 GYROS = ("gyro", "gyro_roll", "gyro_yaw")
 
@@ -55,7 +49,6 @@ _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg 
 _WALK = within(0.0, math.inf, "a random walk of 0 or more")
 _K2 = within(0.0, 0.1, "a coefficient from 0 to 0.1 s^2/m")
 _WAIT = within(0.0, 1e6, "a time of 0 or more")
-_WITHIN = within(-5.0, 5.0, "a position within 5 m of the pivot (mm given as m?)")
 _PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
 
 
@@ -173,7 +166,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class Estimator:
-    """The fusion of all sensors.
+    """The estimator of the angle; keys other than its kind are of the fusion of all sensors.
 
     ``snap`` [rad^2/s^7], None where the recording decides (`inercal.aoa.diagnosis.choice`); until then `density`.
     """
@@ -189,6 +182,7 @@ class Estimator:
     gate: float = option(
         "innovation squared over its variance from which a sample is held back", 25.0, least=1.0
     )
+    kind: EstimatorKind = option("; ".join(f"{kind}: {words}" for kind, words in WORDS.items()), "fusion")
 
     @property
     def density(self) -> float:
@@ -199,7 +193,7 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Methods:
-    """The paper's way, where an option of the command asks for it; options override these keys."""
+    """The paper's way, for the estimator of that kind."""
 
     static: Static = option("the static mechanisation", "improved")
     centrifugal: Centrifugal = option("compensation of r w^2", "mechanical")
@@ -338,23 +332,6 @@ class MotionPlan:
 
 
 @dataclass(frozen=True)
-class Design:
-    """Places where accelerometers may sit, for `inercal design aoa`."""
-
-    accelerometers: int = option(
-        "how many; as many as there are under [sensors] if 0", 0, example=3, least=0, most=12
-    )
-    rearmost: float = quantity(
-        "position of the rearmost place, negative behind the pivot", "length", "-0.25 m", bounds=_WITHIN
-    )
-    foremost: float = quantity("position of the foremost place", "length", "0.25 m", bounds=_WITHIN)
-    places: int = option("places, evenly from the rearmost to the foremost", 5, least=2, most=41)
-    axes: tuple[AxisName, ...] = option(
-        "axes that they may look along", tuple(AXES), example=["+x", "+z", "-z"]
-    )
-
-
-@dataclass(frozen=True)
 class Goal:
     """Wanted standard uncertainty, for `inercal design aoa`."""
 
@@ -371,6 +348,7 @@ class AoaSettings:
     ``sensors`` holds the calibrations by name: those of the layout, and ``gyro``, ``gyro_roll``, ``gyro_yaw``.
     ``traceability``, ``temperature``, ``given`` as in `inercal.imu.settings.ImuSettings`. ``corrections`` are scale and
     axis angle [rad] by which an earlier run changed accelerometers, by name (`inercal.aoa.reference.corrections`).
+    ``layouts`` are those that a design compares with the stated one, by name.
     """
 
     site: Site
@@ -388,7 +366,7 @@ class AoaSettings:
     alarm: Alarm = field(default_factory=Alarm)
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
-    design: Design = field(default_factory=Design)
+    layouts: Mapping[str, Layout] = field(default_factory=dict)
     goal: Goal = field(default_factory=Goal)
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

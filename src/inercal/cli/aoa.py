@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.aoa.settings import AoaSettings
     from inercal.cli.streaming import Estimators
     from inercal.records.record import Record
     from inercal.stream.lines import Lines
     from inercal.stream.run import Recursive
-
-Static = Literal["segmented", "complementary", "improved", "difference", "gls"]
-Centrifugal = Literal["none", "low-pass", "mechanical", "decision"]
-Tangential = Literal["none", "differentiated", "dual"]
-States = Literal[8, 11, 15, 19]
 
 
 @Parameter(name="*")
@@ -68,8 +64,13 @@ class MethodOptions:
     @property
     def keys(self) -> list[str]:
         """The overrides of the study that stand for options."""
-        states = [] if self.states is None else [f"estimator.states={self.states}"]
-        return [*states, *(["estimator.smooth=true"] if self.smooth else [])]
+        kind = "paper" if self.paper else "fusion" if any(self.fusion.values()) else ""
+        return [
+            *([f"estimator.kind={kind}"] if kind else []),
+            *(f"methods.{name}={choice}" for name, choice in self.paper.items()),
+            *([] if self.states is None else [f"estimator.states={self.states}"]),
+            *(["estimator.smooth=true"] if self.smooth else []),
+        ]
 
     def check(self, stream: bool) -> None:
         """Fail where options contradict each other; raises `InputError`."""
@@ -78,6 +79,11 @@ class MethodOptions:
             raise InputError(
                 option, f"found with {chosen[0]}, expected the fusion or the paper's way, not both"
             )
+        if stream and chosen:
+            raise InputError(
+                chosen[0],
+                "found with a stream, expected the fusion, which is the default: the paper's way is for files",
+            )
         whole = {"--compare": self.compare, "--smooth": self.smooth, "--points": self.points}
         for option in (name for name, given in whole.items() if given):
             if stream:
@@ -85,10 +91,6 @@ class MethodOptions:
                     option,
                     "found with a stream, expected one method that does not look ahead, a line for each sample",
                 )
-
-    def methods(self, settings: AoaSettings) -> Methods | None:
-        """The paper's way, what was not chosen as the study says; None for the fusion."""
-        return replace(settings.methods, **self.paper) if self.paper else None  # type: ignore[arg-type]
 
 
 def aoa(
@@ -131,7 +133,7 @@ def aoa(
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
         made: list[Any] = []
-        prepare = partial(_live, made, how)
+        prepare = partial(_live, made)
         stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
         failure = made[-1].failure if made else ""
         if failure:
@@ -147,15 +149,14 @@ def aoa(
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study = read_study("aoa", study, keys)
     output.spare(the_study.files)
-    methods = how.methods(the_study.settings)
     clock = time.perf_counter()
     record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
     read_s = time.perf_counter() - clock
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        system.prepare(the_study, how.compare, methods)
+        system.prepare(the_study, how.compare)
     with working(output) as progress:
-        result = system.calibrate([record], the_study, how.compare, progress, methods, how.points, join)
+        result = system.calibrate([record], the_study, how.compare, progress, how.points, join)
     return give(result, output, read_s, "angles")
 
 
@@ -188,23 +189,21 @@ def _runs(
     output.spare(the_study.files)
     span.check()
     record_map = None if map_file is None else read_map(map_file)
-    methods = how.methods(the_study.settings)
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
-        system.prepare(the_study, how.compare, None)
+        system.prepare(the_study, how.compare)
 
     def record(path: Path) -> Record:
         output.spare([path])
         return span.of(read(path, record_map))
 
     with working(output) as progress:
-        result = system.runs(table, the_study, record, how.compare, progress, methods)
+        result = system.runs(table, the_study, record, how.compare, progress)
     return give(result, output, 0.0, "runs")
 
 
 def _live(
     made: list[Any],
-    how: MethodOptions,
     settings: AoaSettings,
     interval: float,
     output: ResultOutput,
@@ -212,7 +211,7 @@ def _live(
     """Prepare a measurement row by row; ``made`` receives it."""
     from inercal.live.estimators import aoa as prepared
 
-    make = prepared(settings, interval, output.say, output.say_finding, how.methods(settings))
+    make = prepared(settings, interval, output.say, output.say_finding)
 
     def estimator(lines: Lines) -> Recursive[Any]:
         made.append(make(lines))

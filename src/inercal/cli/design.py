@@ -135,23 +135,17 @@ def design_aoa(
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
-    """Find where the accelerometers of a model tell its angle best."""
-    from inercal._files import write_text
+    """Say what the sensors of a model can tell of its angle, and other layouts beside."""
     from inercal._jit import compiling
-    from inercal.aoa.design import study_tables
     from inercal.face import aoa as system
 
-    output.check((".json", ".toml"), (study,))
+    output.check(WHOLE, (study,))
     the_study, read_s = study_in("aoa", study, overrides, output)
     with compiling("aoa", output.say_now):
         system.prepare_design(the_study)
     with working(output) as progress:
-        designed = system.design(the_study, progress)
-
-    def sensors(path: Path) -> None:
-        write_text(path, study_tables(designed.evidence.best.layout))
-
-    return give(designed, output, read_s, "sensors", sensors, whole=(".json",))
+        compared = system.design(the_study, progress)
+    return give(compared, output, read_s, "layouts")
 
 
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:

@@ -15,6 +15,7 @@ from cyclopts import (
 )
 from cyclopts.exceptions import UnknownCommandError
 
+from inercal.keys import in_place_of
 from inercal.units import shown
 
 
@@ -77,10 +78,13 @@ def _wrong_value(error: CoercionError, command: str) -> str:
     assert error.token is not None
     assert error.argument is not None
     option = error.token.keyword or error.argument.name
+    found = f"{command}: found {shown(error.token.value)} for {option}"
+    if gone := in_place_of(option, error.token.value):
+        return f"{found}, {gone}"
     choices = _choices(error.argument.hint)
     flag = error.argument.hint is bool
     expected = f"expected {_or(choices)}" if choices else "expected nothing after it" if flag else str(error)
-    return f"{command}: found {shown(error.token.value)} for {option}, {expected}"
+    return f"{found}, {expected}"
 
 
 def _choices(hint: Any) -> list[str]:

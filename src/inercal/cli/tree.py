@@ -165,11 +165,11 @@ COMMANDS = {
     ),
     ("design", "aoa"): (
         "inercal.cli.design:design_aoa",
-        "Find where the accelerometers of a wind-tunnel model tell its angle best, and how good they must be.\n\nThe "
-        "study states the motion, under [design] how many accelerometers and where they may sit, and under [goal] the "
-        "wanted u of theta. Bounds by the fusion and from single samples. --out writes the sensors as tables of a "
-        "study (.toml) or the whole result (.json), --report a page.",
-        "inercal design aoa aoa.toml --out sensors.toml",
+        "Say what the sensors of a wind-tunnel model can tell of its angle, beside other layouts, and how good they "
+        "must be.\n\nThe study states the motion, under [layouts.NAME] where accelerometers might sit instead, and "
+        "under [goal] the wanted u of theta. Bounds by the fusion and from single samples. --out writes the result "
+        "(.json or .toml), --report a page.",
+        "inercal design aoa aoa.toml --report layouts.html",
     ),
     ("simulate", "turntable"): (
         "inercal.cli.simulate:simulate_turntable",

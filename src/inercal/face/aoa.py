@@ -19,7 +19,7 @@ from inercal.records.read import source_of
 from inercal.records.record import Record
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.aoa.settings import AoaSettings
     from inercal.report.html import Picture
 
 ONE_RUN = (
@@ -28,10 +28,10 @@ ONE_RUN = (
 )
 
 
-def prepare(study: Study, compare: bool = False, methods: Methods | None = None) -> None:
+def prepare(study: Study, compare: bool = False) -> None:
     """Load, or compile, the kernels of `calibrate`, so that they do not count in its time."""
     with study.at_fault():
-        task.load_kernels(study.settings, methods, compare)
+        task.load_kernels(study.settings, compare)
 
 
 def calibrate(
@@ -39,19 +39,18 @@ def calibrate(
     study: Study,
     compare: bool = False,
     progress: Progress = lambda _: None,
-    methods: Methods | None = None,
     by_point: bool = False,
     join: str | Path | None = None,
 ) -> Result:
     """Measure the angle of attack; ``evidence`` is the `inercal.aoa.task.Measurement`.
 
-    Parameters and errors are those of `inercal.calibrate`. ``methods`` ask for the paper's way; ``by_point`` for a row
-    for each point in the place of one for each sample, with the columns of the table ``join`` beside.
+    Parameters and errors are those of `inercal.calibrate`. ``by_point`` asks for a row for
+    each point in the place of one for each sample, with the columns of the table ``join`` beside.
     """
     record = one_run(records, ONE_RUN)
 
     def run(given: Record, settings: AoaSettings, say: Progress) -> task.Measurement:
-        return task.measure(given, settings, methods, compare, say)
+        return task.measure(given, settings, compare, say)
 
     other = None if join is None else read_balance(join)
     (measurement,) = calibrations([record], study, progress, run)
@@ -75,7 +74,6 @@ def runs(
     read: Callable[[Path], Record],
     compare: bool = False,
     progress: Progress = lambda _: None,
-    methods: Methods | None = None,
 ) -> Result:
     """Measure the runs that a table lists; ``evidence`` is the `inercal.aoa.runs.series.Series`.
 
@@ -86,9 +84,7 @@ def runs(
 
     table = read_runs_table(path)
     with study.at_fault():
-        done = series.measure_runs(
-            table, lambda run: read(run.path), study.settings, methods, compare, progress
-        )
+        done = series.measure_runs(table, lambda run: read(run.path), study.settings, compare, progress)
     estimate = replace(done.estimate, inputs=(*done.estimate.inputs, *map(source_of, study.files)))
     done = replace(done, estimate=estimate)
 
@@ -153,33 +149,30 @@ def prepare_design(study: Study) -> None:
 
 
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
-    """Find where accelerometers tell the angle best; ``evidence`` is the `inercal.aoa.design.Designed`."""
-    from inercal.aoa.design import REFERENCES
-    from inercal.aoa.design import design as search
+    """Say what the stated layout of the sensors, and those beside it, can tell of the angle.
 
-    designed, result = designed_by("design aoa", study, lambda: search(study.settings, progress), REFERENCES)
+    ``evidence`` is the `inercal.aoa.design.Compared`.
+    """
+    from inercal.aoa.design import REFERENCES, compare
+
+    compared, result = designed_by("design aoa", study, lambda: compare(study.settings, progress), REFERENCES)
 
     def page() -> str:
         from inercal.aoa.figures import layouts
         from inercal.report.html import render
 
-        return render(
-            result,
-            layouts.pictures(designed, study.settings),
-            "Sensors of a wind-tunnel model",
-            (),
-            designed.tables(),
-        )
+        drawn = layouts.pictures(compared, study.settings)
+        return render(result, drawn, "Sensors of a wind-tunnel model", (), compared.tables())
 
     def picture() -> Picture:
         from inercal.aoa.figures import layouts
 
-        return layouts.best(designed)
+        return layouts.main(compared, study.settings)
 
     def tables() -> list[str]:
-        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+        return [f"{table.title}\n{table.text()}" for table in compared.tables()]
 
-    return Result(result, View(result, designed.message, tables, page, picture), designed)
+    return Result(result, View(result, compared.message, tables, page, picture), compared)
 
 
 def _answer(result: dict[str, Any] | Any) -> str:

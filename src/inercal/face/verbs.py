@@ -190,8 +190,8 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
-    """Find the positions or tolerances of a turntable, the path of a platform, the turns of a strapdown unit, or the
-    places of a model's sensors, that tell most.
+    """Find the positions or tolerances of a turntable, the path of a platform, or the turns of a strapdown unit, that
+    tell most; of a model, say what its sensors can tell, beside the other layouts that the study states.
 
     Parameters
     ----------
@@ -203,7 +203,8 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     Returns
     -------
     Result
-        Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is the best plan.
+        Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is the best plan; of a
+        model ``evidence.bounds`` are those of the layouts.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from inercal.errors import StudyError
 from inercal.findings import Finding
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings, Methods
+    from inercal.aoa.settings import AoaSettings
     from inercal.face.study import Study
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.strapdown.settings import StrapdownSettings
@@ -52,21 +52,18 @@ def of_study(study: Study, interval: float, say: Say, say_finding: SayFinding) -
     return of_columns
 
 
-def aoa(
-    settings: AoaSettings,
-    interval: float,
-    say: Say,
-    say_finding: SayFinding,
-    methods: Methods | None = None,
-) -> Make:
-    """Prepare a measurement of angles; by the paper's ``methods``, or the fusion. Raises `StudyError`."""
+def aoa(settings: AoaSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
+    """Prepare a measurement of angles by the fusion. Raises `StudyError` for one that looks ahead."""
+    from inercal.aoa.estimators import STREAMED
     from inercal.aoa.fusion.live_band import load_kernels
     from inercal.aoa.fusion.problem import problem
     from inercal.stream.aoa import Aoa
-    from inercal.stream.aoa_paper import PaperAoa
 
-    if methods is not None:
-        return lambda lines: PaperAoa(lines, settings, methods, interval, say_finding)
+    if (kind := settings.estimator.kind) not in STREAMED:
+        raise StudyError(
+            "estimator.kind",
+            f"found {kind} with a stream, expected {' or '.join(STREAMED)}: {kind} is for files",
+        )
     if settings.estimator.smooth:
         raise StudyError(
             "estimator.smooth", "found true with a stream, expected false: it knows the past alone"

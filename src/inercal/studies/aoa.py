@@ -17,7 +17,6 @@ from inercal.aoa.disturbances import DELAY
 from inercal.aoa.settings import (
     AoaSettings,
     Attitude,
-    Design,
     Estimator,
     Flow,
     Goal,
@@ -52,7 +51,7 @@ from inercal.studies.laboratory import (
     traced,
 )
 from inercal.studies.motion import AoaDisturbancesTable, MotionTable, disturbances_of, motion_of
-from inercal.studies.sensors import SensorsTable, calibrations_of, layout_of
+from inercal.studies.sensors import LayoutTable, SensorsTable, calibrations_of, layout_of, layouts_of
 from inercal.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.units import Quantity, shown
 
@@ -184,7 +183,7 @@ class BandTable(Strict):
 
 
 class EstimatorTable(table_of(Estimator)):  # type: ignore[misc]
-    """The fusion of all sensors."""
+    """The estimator of the angle; keys other than its kind are of the fusion of all sensors."""
 
     snap: _Snap = Field(
         default=None,
@@ -236,7 +235,9 @@ class AoaStudyFile(Strict):
     band: BandTable = Field(
         default=BandTable(), title="Band", description="what of the sensors the fusion takes"
     )
-    estimator: EstimatorTable = Field(default=EstimatorTable(), title="Estimator", description="the fusion")
+    estimator: EstimatorTable = Field(
+        default=EstimatorTable(), title="Estimator", description="how the angle is found"
+    )
     methods: Stated[Methods] = Field(default=Methods(), title="Methods", description="the paper's way")
     model: Stated[ModelAttitude] = Field(
         default=ModelAttitude(), title="Model", description="how the model lies"
@@ -249,8 +250,12 @@ class AoaStudyFile(Strict):
     alarm: Stated[Alarm] = Field(
         default=Alarm(), title="Alarm", description="limits of the angle, for live measurements"
     )
-    design: Stated[Design] = Field(
-        default=Design(), title="Design", description="where `inercal design aoa` may put accelerometers"
+    layouts: dict[str, LayoutTable] = Field(
+        default_factory=dict,
+        title="Layouts",
+        description="what `inercal design aoa` sets beside [sensors], each a table of a name of one's own: of each "
+        "accelerometer what differs, and all of further ones",
+        examples=[{"long": {"a1": {"r": "-0.3 m"}, "a3": {"r": "0.3 m"}}}],
     )
     goal: Stated[Goal] = Field(
         default=Goal(), title="Goal", description="uncertainty that a design is to reach"
@@ -261,6 +266,16 @@ class AoaStudyFile(Strict):
     specification: Tolerances
     traceability: Traceability = TraceabilityTable()
     conditions: Conditions = ConditionsTable()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_search(cls, data: Any) -> Any:
+        """Refuse the table of the search for places, which 0.2.0 had."""
+        if isinstance(data, Mapping) and "design" in data:
+            raise refusal(
+                "design: found, which is gone since 0.3.0, expected in its place [layouts.NAME], places to compare"
+            )
+        return data
 
 
 def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
@@ -279,7 +294,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         prior=_prior(file.prior),
         sensors=sensors,
         timing=_timing(file.timing),
-        band=Band(file.band.low_pass, tuple(each.value for each in file.band.notch)),
+        band=Band(file.band.low_pass, tuple(frequency.value for frequency in file.band.notch)),
         estimator=_estimator(file.estimator, path),
         methods=file.methods,
         attitude=Attitude(file.model.roll, file.model.yaw, file.flow.upwash, file.flow.sidewash),
@@ -288,7 +303,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
         alarm=_alarm(file.alarm, path),
         motion=motion,
         disturbances=disturbances_of(file.disturbances, layout, sensors, motion, path),
-        design=_design(file.design, path),
+        layouts=layouts_of(data, path),
         goal=file.goal,
         traceability=traced(file.traceability.model_dump(), file.item),
         temperature=file.conditions.temperature,
@@ -303,16 +318,6 @@ def _alarm(alarm: Alarm, path: str | Path) -> Alarm:
         found = f"{math.degrees(lowest):g} deg with highest {math.degrees(highest):g} deg"
         raise StudyError(path, f"alarm.lowest: found {found}, expected it below")
     return alarm
-
-
-def _design(design: Design, path: str | Path) -> Design:
-    """The design; refuses places that are one."""
-    if not design.rearmost < design.foremost:
-        raise StudyError(
-            path,
-            f"design.rearmost: found {design.rearmost:g} m with foremost {design.foremost:g} m, expected it behind",
-        )
-    return design
 
 
 def _prior(table: SensorPriorTable) -> Prior:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
 
-from inercal._toml import Strict
-from inercal.aoa.layout import AXES, Layout
+from inercal._toml import Strict, check
+from inercal.aoa.layout import AXES, STATED, Layout
 from inercal.aoa.settings import GYROS, Calibration, Per
 from inercal.errors import InputError, QuantityError, StudyError
 from inercal.findings import Status
@@ -29,6 +30,9 @@ from inercal.units import Quantity, parse_quantity, parse_unit, shown
 
 MOST = 24
 """Accelerometers that a study may have."""
+
+_LONGEST = 40
+"""Characters of the name of a layout."""
 
 FARTHEST = 5.0
 """Distance from the pivot [m] beyond which a position is taken for one in mm."""
@@ -87,7 +91,7 @@ class _SensorTable(Strict):
 
     @model_validator(mode="after")
     def _one_calibration(self) -> _SensorTable:
-        """Refuse what stands beside a file, or is for one."""
+        """Refuse scale or bias beside a calibration file, and a channel without one."""
         beside = [key for key in ("scale", "bias") if getattr(self, key, None) is not None]
         if self.calibration is not None and beside:
             raise refusal(f"found calibration and {beside[0]}, expected one of them")
@@ -148,16 +152,31 @@ class RateGyroTable(_SensorTable):
     )
 
 
+class PlaceTable(Strict):
+    """Direction and place of an accelerometer in a layout beside [sensors]; as there where absent."""
+
+    axis: Literal["+x", "-x", "+z", "-z"] | None = Field(
+        default=None, description="where its input axis points: x forward, z up; or angle"
+    )
+    angle: _Angle | None = Field(
+        default=None, description="of its input axis from +x (forward) towards -z (down), in place of axis"
+    )
+    r: _Position | None = Field(default=None, description="how far ahead of the pivot it sits")
+    z: _Position | None = Field(default=None, description="how far above the pivot", examples=["20 mm"])
+
+
+def _accelerometers(table: type[Strict]) -> dict[str, Any]:
+    """Fields of all accelerometers that a study may have, each of such a table."""
+    return {
+        f"a{k}": (table | None, Field(default=None, title=f"A{k}", description=f"accelerometer {k}"))
+        for k in range(1, MOST + 1)
+    }
+
+
 def _fields() -> dict[str, Any]:
     """Fields of all sensors that a study may have."""
     of_gyros = ("nose-up positive", "rolling right wing down positive", "yawing nose left positive")
-    made: dict[str, Any] = {
-        f"a{k}": (
-            AccelerometerTable | None,
-            Field(default=None, title=f"A{k}", description=f"accelerometer {k}"),
-        )
-        for k in range(1, MOST + 1)
-    }
+    made = _accelerometers(AccelerometerTable)
     for name, words in zip(GYROS, of_gyros, strict=True):
         title = name.replace("_", " ").capitalize()
         made[name] = (RateGyroTable | None, Field(default=None, title=title, description=words))
@@ -193,10 +212,47 @@ def layout_of(table: SensorsTable) -> Layout:
     names = [
         name for name in type(table).model_fields if name not in GYROS and getattr(table, name) is not None
     ]
-    each = [getattr(table, name) for name in names]
-    angles = [AXES[one.axis] if one.angle is None else one.angle.value for one in each]
-    heights = [0.0 if one.z is None else one.z.value for one in each]
-    return Layout(tuple(names), np.array(angles), np.array([one.r.value for one in each]), np.array(heights))
+    sensors = [getattr(table, name) for name in names]
+    angles = [AXES[sensor.axis] if sensor.angle is None else sensor.angle.value for sensor in sensors]
+    ahead = [sensor.r.value for sensor in sensors]
+    heights = [0.0 if sensor.z is None else sensor.z.value for sensor in sensors]
+    return Layout(tuple(names), np.array(angles), np.array(ahead), np.array(heights))
+
+
+_Layout: Any = create_model("Layout", __base__=Strict, **_accelerometers(PlaceTable))
+
+
+class LayoutTable(_Layout):  # type: ignore[misc]
+    """A layout beside [sensors]: what differs, by accelerometer."""
+
+
+def layouts_of(data: Mapping[str, Any], where: str | Path) -> dict[str, Layout]:
+    """The layouts of a study's ``data`` beside that under [sensors], by name.
+
+    Each is read as the sensors are, so that it is refused for the same reasons: raises `StudyError`.
+    """
+    geometry = ("axis", "angle", "r", "z")
+    stated = {
+        name: {key: sensor[key] for key in geometry if key in sensor}
+        for name, sensor in data["sensors"].items()
+        if name not in GYROS
+    }
+    layouts = {}
+    for name, differing in data.get("layouts", {}).items():
+        if name == STATED or not name.isprintable() or not 0 < len(name) <= _LONGEST:
+            raise StudyError(
+                where,
+                f"layouts: found the name {shown(name)}, expected one of {_LONGEST} characters at most, other than "
+                f"{STATED}, as the layout under [sensors] is called",
+            )
+        merged = dict(stated)
+        for sensor, place in differing.items():
+            replaced = {*place, *(("axis", "angle") if {"axis", "angle"} & place.keys() else ())}
+            kept = {key: text for key, text in stated.get(sensor, {}).items() if key not in replaced}
+            merged[sensor] = kept | place
+        table = check(SensorsTable, merged, f"{where}: layouts.{name}", StudyError)
+        layouts[name] = layout_of(table)
+    return layouts
 
 
 def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibration]:

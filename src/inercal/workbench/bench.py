@@ -166,8 +166,8 @@ class Bench:
             )
         kind = PLANNED[session.kind]
         words = [*kind.command, STUDY, *(word for each in settings for word in ("--set", each))]
-        out = ["--out", f"{{out}}/plan{kind.ending}", "--report", "{out}/report.html"]
-        return self.queue.add(session.id, session.folder, [*words, *out])
+        out = ["--out", f"{{out}}/plan{kind.ending}"] if kind.ending else []
+        return self.queue.add(session.id, session.folder, [*words, *out, "--report", "{out}/report.html"])
 
     def result(self, job: Job) -> Result:
         """The result of a job; raises `InputError` where there is none."""

@@ -16,8 +16,9 @@ from inercal.workbench.form import changed, parsed
 
 @dataclass(frozen=True)
 class Kind:
-    """The plan of a kind of study: words of its ``command``, the ending of what that writes, what a line ``says``, and
-    plans by their name, each as keys with their TOML; empty ones are taken out."""
+    """The plan of a kind of study: words of its ``command``, the ending of the plan that it writes, empty where it
+    finds none, what a line ``says``, and plans by their name, each as keys with their TOML; empty ones are taken
+    out."""
 
     command: tuple[str, ...]
     ending: str
@@ -57,9 +58,6 @@ def with_found(kind: str, text: str, found: str) -> str:
     if KINDS[kind].ending == ".csv":
         return with_lines(kind, text, "\n".join(found.splitlines()[1:]))
     tables = tomllib.loads(found)
-    if kind == "aoa":
-        rows = [[name, str(each["axis"]), str(each["r"])] for name, each in tables["sensors"].items()]
-        return _with_sensors(text, rows)
     others = dict.fromkeys(_WHERE[kind][1], "")
     return with_keys(text, others | {f"plan.{key}": _toml(value) for key, value in tables["plan"].items()})
 
@@ -187,7 +185,7 @@ KINDS: Mapping[str, Kind] = {
         ("design", "strapdown"), ".toml", "y, 90 deg (axis of the unit, angle)", _named()["strapdown"]
     ),
     "aoa": Kind(
-        ("design", "aoa"), ".toml", "a1, -z, -0.25 m (name, axis, place ahead of the pivot)", _named()["aoa"]
+        ("design", "aoa"), "", "a1, -z, -0.25 m (name, axis, place ahead of the pivot)", _named()["aoa"]
     ),
 }
 """Kinds of study that plan a test."""

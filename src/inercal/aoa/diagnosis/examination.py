@@ -25,11 +25,12 @@ from inercal.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, str
 from inercal.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults
 from inercal.aoa.diagnosis.noise_check import misstated
 from inercal.aoa.diagnosis.small import small_errors
+from inercal.aoa.estimators import STATES
 from inercal.aoa.fusion.problem import problem
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import later
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.settings import STATES, AoaSettings
+from inercal.aoa.settings import AoaSettings
 from inercal.estimate.hypotheses import Fitted, tried
 from inercal.findings import EVERYTHING, Finding
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inercal.aoa.estimators import States
 from inercal.aoa.fusion.band import fused_case
 from inercal.aoa.fusion.loop import OUTPUTS
 from inercal.aoa.fusion.problem import FilterProblem, problem
@@ -15,7 +16,7 @@ from inercal.aoa.fusion.run import State, advance, initial
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.clock import in_time, later
 from inercal.aoa.reading.recording import Recording
-from inercal.aoa.settings import AoaSettings, States
+from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array, remembered
 from inercal.records.checks.values import outlying
 

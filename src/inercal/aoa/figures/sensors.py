@@ -24,7 +24,14 @@ _ARROW = 0.17
 """Length of an arrow, of the distance of the outermost sensor."""
 
 
-def side_view(names: Sequence[str], angle: Array, r: Array, z: Array, gyro: bool) -> Picture:
+def side_view(
+    names: Sequence[str],
+    angle: Array,
+    r: Array,
+    z: Array,
+    gyro: bool,
+    title: str = "Where the sensors are",
+) -> Picture:
     """Accelerometers (N,) of a model from its right side: ``angle`` lambda [rad] of their axes, from forward towards
     down, and positions ``r`` ahead of the pivot and ``z`` above it [m]."""
     reach = float(np.max(np.hypot(r, z), initial=0.0))
@@ -67,7 +74,7 @@ def side_view(names: Sequence[str], angle: Array, r: Array, z: Array, gyro: bool
     far = f" The outermost is {reach:.4g} m from the pivot, which no usual model has: are the units right?"
     doubt = "" if reach == 0.0 or _USUAL[0] <= reach <= _USUAL[1] else far
     return draw(
-        "Where the sensors are",
+        title,
         "The model from its right side, to scale, as the study states it: each accelerometer with an arrow along "
         "which it reads plus; at the right its place and the angle of its axis, from forward towards down. Compare "
         "with the drawing of the model: a wrong unit, swapped sensors or an axis that looks the other way show here "

@@ -234,10 +234,16 @@ def _causal(
     return state, Trace(out[:done], tuple(starts)), rolls
 
 
+def fusion_label(smoothed: bool, states: int) -> str:
+    """Name of the fusion by its ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
+    return f"{'smoothed' if smoothed else 'fusion'} {states}"
+
+
 def of_fusion(filtered: FilterResult, states: int) -> Angles:
-    """The angles of the fusion, named by its ``states`` (of three accelerometers): ``fusion 19``, ``smoothed 19``."""
-    way = "smoothed" if filtered.smoothed else "fusion"
-    return Angles(f"{way} {states}", filtered.theta, filtered.u, filtered.rate, filtered.rate_u)
+    """The angles of the fusion, named by its ``states``."""
+    return Angles(
+        fusion_label(filtered.smoothed, states), filtered.theta, filtered.u, filtered.rate, filtered.rate_u
+    )
 
 
 def tracked_roll(

@@ -12,12 +12,12 @@ import math
 
 import numpy as np
 
+from inercal.aoa.estimators import Centrifugal
 from inercal.aoa.layout import Layout, centrifugal_arms, pair_weights, tangential_arms
 from inercal.aoa.limits import LIMITS
 from inercal.aoa.paper.frequency import oscillation_frequency
 from inercal.aoa.paper.residuals import DECISION
 from inercal.aoa.reading.clock import usual_step
-from inercal.aoa.settings import Centrifugal
 from inercal.arrays import Array
 from inercal.errors import StudyError
 

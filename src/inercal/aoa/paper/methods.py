@@ -33,8 +33,6 @@ MEASURED = (
     Methods(),
     Methods(static="complementary"),
     Methods(static="segmented"),
-    Methods(static="difference"),
-    Methods(static="gls"),
     Methods(centrifugal="low-pass"),
     Methods(centrifugal="decision"),
     Methods(tangential="differentiated"),
@@ -67,17 +65,13 @@ def measure(recording: Recording, settings: AoaSettings, methods: Methods) -> An
         There is no gyro where the methods need one, or time does not go on.
     """
     settings.attitude.check_pitch_shows()
-    check_sensors(settings, methods, not len(recording.t) or bool(np.isfinite(recording.gyro).any()))
+    _check_sensors(settings, methods, not len(recording.t) or bool(np.isfinite(recording.gyro).any()))
     gyro_delay = settings.timing.gyro_delay
     if gyro_delay is None:
         shown = relative_delay(recording, settings.layout)
         plain = shown is not None and abs(shown.value) > LIMITS.delay_sigmas * shown.u
         gyro_delay = shown.value if shown is not None and plain else 0.0
-    return each_row(aligned(recording, gyro_delay), settings, methods)
-
-
-def each_row(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
-    """As `measure`, of rows whose gyro is prompt, by sensors that `check_sensors` has passed."""
+    recording = aligned(recording, gyro_delay)
     level, taken = settings.attitude.level, later(recording.t)
     t, acc, gyro = recording.t[taken], recording.acc[taken], recording.gyro[taken]
     noise = settings.noise
@@ -103,9 +97,7 @@ def each_row(recording: Recording, settings: AoaSettings, methods: Methods) -> A
             w, al = np.nan_to_num(rate[rows]), np.nan_to_num(acceleration[rows])
             terms = error_terms(settings, methods.tangential, layout, level, w, al, compensated[rows], step)
             errors = [(weight, dual @ matrix @ dual.T) for weight, matrix in terms]
-            still = static.angle(
-                methods.static, read @ dual.T, layout, settings.site.gravity, level, errors[0][1]
-            )
+            still = static.angle(methods.static, read @ dual.T, layout, settings.site.gravity, level)
         except StudyError:  # too few axes are left in these rows
             acceleration[rows] = np.nan
             continue
@@ -126,7 +118,7 @@ def low_passed(angles: Angles, t: Array, cutoff: float = LOW_PASS) -> Angles:
     return replace(angles, method=f"{angles.method}, {cutoff:.6g} Hz low pass", theta=theta)
 
 
-def check_sensors(settings: AoaSettings, methods: Methods, has_gyro: bool) -> None:
+def _check_sensors(settings: AoaSettings, methods: Methods, has_gyro: bool) -> None:
     """Refuse methods that lack sensors in all rows: raises `StudyError`, and `RecordError` without a gyro."""
     layout, level = settings.layout, settings.attitude.level
     if methods.tangential == "dual":
@@ -145,8 +137,8 @@ def _alike(acc: Array) -> Iterator[tuple[NDArray[np.intp], list[int]]]:
     kind = np.zeros(len(acc), dtype=np.int64)
     for k in range(acc.shape[1]):
         kind = 2 * kind + finite[:, k]
-    for each in np.unique(kind[kind > 0]):
-        rows = np.flatnonzero(kind == each)
+    for combination in np.unique(kind[kind > 0]):
+        rows = np.flatnonzero(kind == combination)
         seen = [int(k) for k in np.flatnonzero(finite[rows[0]])]
         yield rows, seen
 

@@ -17,9 +17,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from inercal.aoa.estimators import Tangential
 from inercal.aoa.layout import Layout, all_weights, centrifugal_arms, tangential_arms
 from inercal.aoa.paper.static import Errors
-from inercal.aoa.settings import AoaSettings, Noise, Prior, Tangential
+from inercal.aoa.settings import AoaSettings, Noise, Prior
 from inercal.arrays import Array
 
 DECISION = 2.0 + math.sqrt(6.0)
@@ -84,11 +85,6 @@ def dual_gain(r1: float, r3: float) -> float:
 def may_be_left(error: float, arm: float) -> float:
     """theta_m Om^2 [rad/s^2] below which the tangential term is better left alone: 2 dA/L, a rule of its own."""
     return dual(error, arm, alike=True)
-
-
-def late(peak_rate: float, delay: float) -> float:
-    """Error of the angle [rad] by a ``delay`` [s] of an output: theta' tau."""
-    return peak_rate * delay
 
 
 def sampled(

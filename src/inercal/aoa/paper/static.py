@@ -1,11 +1,11 @@
-"""The angle of a model at rest from the readings of N accelerometers along any axes, in five ways.
+"""The angle of a model at rest from the readings of N accelerometers along any axes, in the three ways of the paper.
 
 At rest axis i reads A_i = g h_i . (sin theta, cos theta), h_i = (cos lambda_i, -c sin lambda_i) with c the cosine of
 the roll; in motion the readings are to be freed of lever-arm terms before (`inercal.aoa.paper.lever`). Each way gives
 the angle and its derivatives by the readings (`Still.gain`): from these `spread` computes the uncertainty, and `bound`
 the effect of errors of a given size.
 
-Sources: Tan et al. 2021 for segmented, complementary and improved; `difference` and `gls` are ours.
+Source: Tan et al. 2021.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.aoa.estimators import Static
 from inercal.aoa.layout import Layout, axes, inverse_axes
-from inercal.aoa.settings import Static
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.geometry.rotations import principal
@@ -38,10 +38,6 @@ _LATER = 1e-9
 _FLAT = 1e-2
 """Smallest slope of a reading over g against theta; smaller ones are replaced by it."""
 
-_ROUNDS = 10
-_CONVERGED = 1e-11
-_NO_WEIGHT = 1e-9
-
 
 class Still(NamedTuple):
     """``theta`` (n,) [rad] within (-pi, pi], and ``gain`` (n, N) [rad s^2/m], its derivative by each reading."""
@@ -50,17 +46,12 @@ class Still(NamedTuple):
     gain: Array
 
 
-def angle(
-    way: Static,
-    acc: Array,
-    layout: Layout,
-    gravity: float,
-    level: float = 1.0,
-    covariance: Array | None = None,
-) -> Still:
-    """The angle by one of the five ways; parameters as of `gls`."""
-    if way == "gls":
-        return gls(acc, layout, gravity, level, covariance)
+def angle(way: Static, acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
+    """The angle by one of the three ways.
+
+    ``acc`` (n, N) [m/s^2] are readings freed of lever-arm terms, none missing; ``gravity`` [m/s^2]; ``level`` the
+    cosine of the roll. Raises `StudyError` where the layout lacks the axes that the way needs.
+    """
     return _WAYS[way](acc, layout, gravity, level)
 
 
@@ -69,8 +60,8 @@ def segmented(acc: Array, layout: Layout, gravity: float, level: float = 1.0) ->
 
     An axis that looks backward (cos(theta - lambda_i) < 0) is read on the other branch of the arc sine, so that any two
     axes that are not parallel show all angles. Choosing the smallest reading instead, without the angle, is wrong by
-    180 deg where axes are antiparallel. Error dA / (g cos(theta - lambda_i)) >= dA/g. Parameters and what is raised as
-    of `gls`.
+    180 deg where axes are antiparallel. Error dA / (g cos(theta - lambda_i)) >= dA/g. Parameters and errors
+    as of `angle`.
     """
     h = _axes(layout, level)
     coarse = _direction(acc @ inverse_axes(layout, level).T)
@@ -90,7 +81,8 @@ def segmented(acc: Array, layout: Layout, gravity: float, level: float = 1.0) ->
 def complementary(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
     """theta = atan2(A_2, -A_1) by two axes at a right angle: the first such pair.
 
-    Error sqrt(2) dA sin(theta - lambda_2 + 45 deg) / g where both err by dA. Parameters and what is raised as of `gls`.
+    Error sqrt(2) dA sin(theta - lambda_2 + 45 deg) / g where both err by dA. Parameters and errors as of
+    `angle`.
     """
     first = _pairs(layout, level, "complementary")[:1]
     return _by_two(acc, first, np.zeros(len(acc), dtype=np.intp), gravity)
@@ -101,7 +93,7 @@ def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> 
 
     That is |theta - lambda_2 + 45 deg| <= 45 deg modulo 180 deg, for the three axes -z, +x, +z: the first two below
     theta = 0, the last two above. Error <= dA/g where both err by dA. With one pair it is complementary. Parameters
-    and what is raised as of `gls`.
+    and errors as of `angle`.
     """
     pairs = _pairs(layout, level, "improved")
     coarse = acc @ inverse_axes(layout, level).T
@@ -111,67 +103,10 @@ def improved(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> 
     return _by_two(acc, pairs, np.argmin(suffering + rank, axis=1), gravity)
 
 
-def difference(acc: Array, layout: Layout, gravity: float, level: float = 1.0) -> Still:
-    """theta = atan2(A_2, (A_3 - A_1)/2) by two antiparallel axes and one square to them, as -z, +z, +x.
-
-    All around without switching; what errs alike in both antiparallel axes cancels. Where the one square to them has an
-    antiparallel one too, their half difference takes its place. Parameters and what is raised as of `gls`.
-    """
-    h, n = _axes(layout, level), len(layout.names)
-    opposite = dict(layout.opposed()) | {j: i for i, j in layout.opposed()}
-    for i, j in layout.square():
-        if i not in opposite and j not in opposite:
-            continue
-        half = np.zeros((2, n))
-        for row, k in zip(half, (i, j), strict=True):
-            row[k] = 1.0
-            if k in opposite:
-                row[k], row[opposite[k]] = 0.5, -0.5
-        chosen = np.linalg.inv(half @ h) @ half
-        return _by_two(acc, chosen[None], np.zeros(len(acc), dtype=np.intp), gravity)
-    raise StudyError(
-        "sensors", "found no antiparallel axes with one at a right angle to them, which difference needs"
-    )
-
-
-def gls(
-    acc: Array, layout: Layout, gravity: float, level: float = 1.0, covariance: Array | None = None
-) -> Still:
-    """Generalised least squares: the theta that fits the readings of all axes best.
-
-    Gauss and Newton's rounds from plain least squares on. Weights are the pseudo-inverse of the covariance: directions
-    without errors, as where the readings of two axes were made equal, tell nothing of the angle.
-
-    ``acc`` (n, N) [m/s^2] are readings freed of lever-arm terms, none missing; ``gravity`` [m/s^2]; ``level`` the
-    cosine of the roll; ``covariance`` (N, N) [(m/s^2)^2] of the errors of the readings, equal and independent without
-    one. Raises `StudyError` where the layout lacks the axes that the way needs.
-    """
-    h = _axes(layout, level)
-    if covariance is None:
-        covariance = np.eye(len(h))
-    weight = np.linalg.pinv(covariance / np.trace(covariance), rcond=_NO_WEIGHT, hermitian=True)
-    read = acc / gravity
-    force = acc @ inverse_axes(layout, level).T
-    theta = np.arctan2(force[:, 0], force[:, 1])
-    for _ in range(_ROUNDS):
-        direction = np.stack([np.sin(theta), np.cos(theta)], axis=-1)
-        slope = _slopes(direction, h)
-        weighted = slope @ weight
-        power = np.einsum("ni,ni->n", weighted, slope)[:, None]
-        # where the readings that count do not change with theta it is not known
-        gain = np.divide(weighted, power, out=np.full_like(weighted, np.nan), where=power > 0.0)
-        step = np.einsum("ni,ni->n", gain, read - direction @ h.T)
-        theta = theta + step
-        if not (np.abs(step) > _CONVERGED).any():
-            break
-    return Still(principal(theta), gain / gravity)
-
-
 _WAYS: Mapping[str, Callable[[Array, Layout, float, float], Still]] = {
     "segmented": segmented,
     "complementary": complementary,
     "improved": improved,
-    "difference": difference,
 }
 
 

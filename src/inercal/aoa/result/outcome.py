@@ -95,8 +95,8 @@ def assemble(
     result |= _of_sensors(settings, verified) | {"nis_mean": filtered.nis_mean, "posterior": {}}
     model = SPATIAL if problem.spatial else MODEL + FLAT
     basis = _basis(recording, settings, angles, model, REFERENCES + _OF_FUSION)
-    squares = [(np.isfinite(each).sum(), np.nansum(np.square(each))) for each in filtered.innovations.T]
-    count, power = (float(sum(each)) for each in zip(*squares, strict=True))
+    squares = [(np.isfinite(column).sum(), np.nansum(np.square(column))) for column in filtered.innovations.T]
+    count, power = (float(sum(column)) for column in zip(*squares, strict=True))
     rms = math.sqrt(power / count) if count else math.nan
     dof = float(max(count - len(names), 1))
     statistics = _statistics(recording, angles) | {
@@ -142,7 +142,7 @@ def assemble(
     )
 
 
-def assemble_paper(
+def assemble_angles(
     recording: Recording,
     settings: AoaSettings,
     angles: Angles,
@@ -153,7 +153,7 @@ def assemble_paper(
     compared: Mapping[str, Angles] | None = None,
     verified: Verified | None = None,
 ) -> Estimate:
-    """The estimate by one of the paper's methods: angles without coefficients. Parameters as of `assemble`."""
+    """The estimate by an estimator that finds angles without coefficients. Parameters as of `assemble`."""
     all_findings = _all_findings(recording, findings)
     result = _result(recording, settings, angles, delay, points, errors, compared)
     result |= _of_sensors(settings, verified) | {"nis_mean": None, "posterior": {}}
@@ -249,8 +249,10 @@ def _result(
         },
         **({"reference": _reference(judged[angles.method])} if angles.method in judged else {}),
         "timing": _timing(settings, angles, delay),
-        "points": [asdict(each) for each in points],
-        "compare": {name: _beside(each, angles, judged.get(name)) for name, each in (compared or {}).items()},
+        "points": [asdict(point) for point in points],
+        "compare": {
+            name: _beside(other, angles, judged.get(name)) for name, other in (compared or {}).items()
+        },
     }
 
 

@@ -58,10 +58,6 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     return tuple(inputs)
 
 
-_FEW = 1000
-"""Rows below which a thread costs more than it spares: a stream asks for one row at a time."""
-
-
 def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
     """The problem of the fusion under a change, which also moves the coefficients of an earlier run."""
     constants = problem.constants._replace(gravity=float(lean.gravity), roll_cosine=math.cos(lean.roll))
@@ -102,17 +98,11 @@ def by_fusion(
     return _with_stated(angles, settings, run)
 
 
-def by_methods(
-    recording: Recording,
-    settings: AoaSettings,
-    methods: Methods,
-    by: Callable[[Recording, AoaSettings, Methods], Angles] = measure,
-) -> Angles:
-    """The angles of the paper's methods, ``by`` those of `inercal.aoa.paper.methods`, after a tare by the study's zero;
-    stated inputs count in their uncertainty."""
+def by_methods(recording: Recording, settings: AoaSettings, methods: Methods) -> Angles:
+    """The angles of the paper's methods, after a tare by the study's zero; stated inputs count in their uncertainty."""
 
     def angles(chosen: AoaSettings) -> Angles:
-        return by(tare(recording, chosen), chosen, methods)
+        return measure(tare(recording, chosen), chosen, methods)
 
     def run(lean: Lean) -> Array:
         attitude, site = settings.attitude, replace(settings.site, gravity=lean.gravity)
@@ -128,8 +118,6 @@ def _with_stated(angles: Angles, settings: AoaSettings, run: Callable[[Lean], Ar
     changes = leans(settings, angles.roll is not None)
     if not changes:
         return angles
-    if len(angles.theta) < _FEW:
-        return widened(angles, settings, changes, list(map(run, changes)))
     with ThreadPoolExecutor() as pool:
         return widened(angles, settings, changes, list(pool.map(run, changes)))
 
@@ -153,7 +141,7 @@ def widened(
 
 def gravity_u(settings: AoaSettings) -> float:
     """Standard uncertainty [m/s^2] of the gravity of the site."""
-    return math.sqrt(sum((each.u * each.sensitivity) ** 2 for each in settings.site.inputs))
+    return math.sqrt(sum((quantity.u * quantity.sensitivity) ** 2 for quantity in settings.site.inputs))
 
 
 def uncertain_roll(settings: AoaSettings, tracked: bool) -> float:

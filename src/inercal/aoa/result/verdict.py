@@ -59,7 +59,7 @@ def nis_limit(count: int) -> float:
 
 
 def of_method(angles: Angles, findings: Sequence[Finding]) -> tuple[Status, str]:
-    """Status and sentence of a result of the paper's methods."""
+    """Status and sentence of a result of angles without coefficients."""
     answered = np.isfinite(angles.theta)
     if 2 * answered.sum() <= len(answered):
         return Status.NOT_CONVERGED, _because(_missing(answered), findings)

@@ -15,7 +15,7 @@ from inercal.aoa.runs.outcome import assemble
 from inercal.aoa.runs.run_table import Run, RunTable
 from inercal.aoa.runs.summary import AtPoint, Oscillation, by_point, oscillations
 from inercal.aoa.runs.tare import Posterior, WindOff, drifts, interpolated
-from inercal.aoa.settings import GYROS, AoaSettings, Methods, Zero
+from inercal.aoa.settings import GYROS, AoaSettings, Zero
 from inercal.aoa.task import Measurement
 from inercal.errors import InputError, RecordError
 from inercal.estimate.result import Estimate
@@ -49,7 +49,6 @@ def measure_runs(
     table: RunTable,
     read: Callable[[Run], Record],
     settings: AoaSettings,
-    methods: Methods | None = None,
     compare: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Series:
@@ -69,9 +68,9 @@ def measure_runs(
         if run.role != "wind-off":
             continue
         progress(f"{run.name}, wind-off")
-        found = _measured(
-            run, records[run], _at_known_angle(settings, run, records[run]), None, False, progress
-        )
+        at_rest = _at_known_angle(settings, run, records[run])
+        fused = replace(at_rest, estimator=replace(at_rest.estimator, kind="fusion"))
+        found = _measured(run, records[run], fused, False, progress)
         if not found.estimate.status.done:
             raise RecordError(
                 run.path,
@@ -88,16 +87,16 @@ def measure_runs(
         progress(run.name)
         known, words = interpolated(tares, at[run]) if tares else (None, "")
         chosen = settings
-        if known is not None and methods is not None:
+        if known is not None and settings.estimator.kind != "fusion":
             chosen, known = _without_biases(settings, known), None
-        found = _measured(run, records[run], chosen, methods, compare, progress, known)
+        found = _measured(run, records[run], chosen, compare, progress, known)
         done[run] = MeasuredRun(run, found, words)
     measured = tuple(done[run] for run in table.runs)
-    winds = [each for each in measured if each.run.role != "wind-off"]
-    at_points = by_point([(each.run.role, each.measurement) for each in winds])
-    oscillating = oscillations([(each.run, each.measurement) for each in winds])
-    findings = [*drifts(sorted(tares, key=lambda each: each.at)), *_clipped(winds)]
-    named = [(each.run, each.measurement.estimate, each.tare) for each in measured]
+    winds = [found for found in measured if found.run.role != "wind-off"]
+    at_points = by_point([(found.run.role, found.measurement) for found in winds])
+    oscillating = oscillations([(found.run, found.measurement) for found in winds])
+    findings = [*drifts(sorted(tares, key=lambda tare: tare.at)), *_clipped(winds)]
+    named = [(found.run, found.measurement.estimate, found.tare) for found in measured]
     estimate = assemble(table, named, at_points, oscillating, findings, settings)
     estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
     return Series(estimate, measured, at_points, oscillating)
@@ -107,14 +106,13 @@ def _measured(
     run: Run,
     record: Record,
     settings: AoaSettings,
-    methods: Methods | None,
     compare: bool,
     progress: Callable[[str], None],
     known: Posterior | None = None,
 ) -> Measurement:
     """One run; a refusal names its file."""
     try:
-        return task.measure(record, settings, methods, compare, progress, known)
+        return task.measure(record, settings, compare, progress, known)
     except RecordError as error:
         raise RecordError(run.path, str(error).removeprefix(f"{run.path}: ")) from error
 
@@ -159,18 +157,18 @@ _ALARM = 0.01
 def _clipped(measured: Sequence[MeasuredRun]) -> list[Finding]:
     """``saturation``: points in which a sensor is clipped, by run."""
     found = []
-    for each in measured:
-        masked = each.measurement.recording.masked
+    for done in measured:
+        masked = done.measurement.recording.masked
         if masked is None:
             continue
         rows = np.asarray(masked.any(axis=1))
-        worst = [(rows[p.start : p.stop].mean(), p.number) for p in each.measurement.points]
+        worst = [(rows[p.start : p.stop].mean(), p.number) for p in done.measurement.points]
         worst = [(share, number) for share, number in worst if share > _ALARM]
         if worst:
             numbers = ", ".join(f"{number:g}" for _, number in worst[:8])
-            many = f"{len(worst)} of {len(each.measurement.points)}: points {numbers}"
+            many = f"{len(worst)} of {len(done.measurement.points)}: points {numbers}"
             text = (
-                f"{each.run.name}: sensors are clipped in {100.0 * max(worst)[0]:.2g} % of the rows of a point "
+                f"{done.run.name}: sensors are clipped in {100.0 * max(worst)[0]:.2g} % of the rows of a point "
                 f"at most, more than {100.0 * _ALARM:g} % in {many}"
             )
             found.append(Finding("saturation", text, harm=()))
@@ -181,18 +179,18 @@ def points_of(series: Series, settings: AoaSettings) -> Record:
     """The points of all runs with the wind on, a row each: those of `inercal.aoa.result.columns.points_record`, the
     number of the run in the table, and its sense, 1 up, -1 down, 0 neither."""
     parts = []
-    for k, each in enumerate(series.measured, start=1):
-        if each.run.role == "wind-off" or not each.measurement.points:
+    for k, done in enumerate(series.measured, start=1):
+        if done.run.role == "wind-off" or not done.measurement.points:
             continue
-        of = points_record(each.measurement.points, each.measurement.recording, settings)
-        sense = {"up": 1.0, "down": -1.0}.get(each.run.role, 0.0)
-        count = len(each.measurement.points)
+        of = points_record(done.measurement.points, done.measurement.recording, settings)
+        sense = {"up": 1.0, "down": -1.0}.get(done.run.role, 0.0)
+        count = len(done.measurement.points)
         numbers = [
             ("run", parse_unit("1"), np.full(count, float(k))),
             ("sense", parse_unit("1"), np.full(count, sense)),
         ]
         own = [(column.name, column.unit, column.values) for column in of.columns.values()]
-        t = next(iter(of.columns.values())).t + (each.run.begin or 0.0)
+        t = next(iter(of.columns.values())).t + (done.run.begin or 0.0)
         parts.append((t, numbers + own))
     if not parts:
         raise InputError("--out", "found no points in any run, expected pauses, or a column point")

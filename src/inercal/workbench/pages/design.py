@@ -83,8 +83,8 @@ class Desk:
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
             self.levers = ui.element("div").classes("w-full")
             self.numbers = ui.element("div").classes("w-full md:sticky md:top-2 self-start")
-        heading("A better plan")
-        button("Search", self.search)
+        heading("A better plan" if self.kind.ending else "Layouts side by side")
+        button("Search" if self.kind.ending else "Compare", self.search)
         self.same = ui.element("div").classes("w-full")
         self.found = ui.element("div").classes("w-full")
         job = bench.last_design(session)
@@ -267,9 +267,10 @@ class Desk:
         """The command that judges and searches with the same sizes."""
         self.same.clear()
         sets = [word for each in self.settings() for word in ("--set", each)]
-        out = ["--out", f"plan{self.kind.ending}", "--report", "design.html"]
+        out = ["--out", f"plan{self.kind.ending}"] if self.kind.ending else []
         with self.same:
-            command(shlex.join(["inercal", *self.kind.command, STUDY, *sets, *out]))
+            words = ["inercal", *self.kind.command, STUDY, *sets, *out, "--report", "design.html"]
+            command(shlex.join(words))
 
     def search(self) -> None:
         """Begin the search for a better plan."""
@@ -288,14 +289,15 @@ class Desk:
         def look() -> None:
             now = self.bench.queue.get(job.id)
             of = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
-            state.set_text(f"The search (job {now.id}) {WORDS[now.state]}{of}")
+            what = "search" if self.kind.ending else "comparison"
+            state.set_text(f"The {what} (job {now.id}) {WORDS[now.state]}{of}")
             if now.state not in ENDED:
                 return
             timer.deactivate()
             with place:
                 if now.said.strip() and now.state is not State.DONE:
                     refused(InercalError(now.said.strip()))
-                if plan.is_file():
+                if self.kind.ending and plan.is_file():
                     button("Take the plan found", lambda: self.take(plan.read_text()), main=True)
                 if now.report is not None:
                     report(now, "search for a plan")
