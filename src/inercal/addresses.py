@@ -14,7 +14,7 @@ from itertools import zip_longest
 from urllib.parse import unquote, unquote_plus
 
 HIDDEN = "***"
-"""What stands in the place of a secret."""
+"""The text in the place of a secret."""
 
 PLAIN = frozenset(
     [
@@ -80,7 +80,7 @@ def holds_secret(address: str) -> bool:
 
 
 def hidden_in(text: str, address: str) -> str:
-    """What a driver or server says of an address, with the secrets of that address hidden, however it spells them."""
+    """Words of a driver or server on an address, with the secrets of that address hidden, however it spells them."""
     for secret in sorted(secrets_in(address), key=len, reverse=True):
         text = text.replace(secret, HIDDEN)
     return without_secrets(text)
@@ -144,7 +144,7 @@ def _kind(scheme: str) -> str:
 
 
 def _hidden(scheme: str, rest: str, whole: bool) -> str:
-    """What follows a scheme, its secrets hidden."""
+    """The rest of an address behind its scheme, its secrets hidden."""
     login, at, tail = _divided(scheme, rest, whole)
     if login:
         user, colon, _ = login.partition(":")

@@ -25,7 +25,7 @@ class Place:
 
     @property
     def given(self) -> str:
-        """What `place_of` takes for the same place in another process: it may hold a secret, so it is shown nowhere."""
+        """The text by which another process finds the same place; it may hold a secret, and is shown nowhere."""
         return self.url if self.folder is None else str(self.folder.absolute())
 
 
