@@ -7,8 +7,8 @@ from inercal.errors import InputError
 from inercal.examples import FOLDER
 from inercal.face.foresight import verticals
 from inercal.face.study import read_study
-from inercal.workbench.form import changed
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
+from inercal.studies.text import with_keys
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
 
 FILES = {
     "turntable": "gyro.toml",
@@ -66,12 +66,3 @@ def test_what_a_search_wrote_becomes_the_plan(study):
     found = '[sensors.a1]\naxis = "+x"\nr = "10 mm"\n\n[sensors.a2]\naxis = "+z"\nr = "20 mm"\n'
     layout = study("aoa", with_found("aoa", (FOLDER / "sting.toml").read_text(), found)).settings.layout
     np.testing.assert_allclose(layout.r, [0.01, 0.02])
-
-
-def test_a_value_over_several_lines_is_changed_as_a_whole():
-    text = '[plan]\nturns = [\n    ["z", "1 deg"],  # a ] in a remark\n    ["x", "2 deg"],\n]\nrate = "1 deg/s"\n'
-    assert changed(text, "plan.turns", '[["y", "3 deg"]]').splitlines() == [
-        "[plan]", 'turns = [["y", "3 deg"]]', 'rate = "1 deg/s"',
-    ]  # fmt: skip
-    out = changed(text, "plan.turns", "")
-    assert [line for line in out.splitlines() if not line.startswith("#")] == ["[plan]", 'rate = "1 deg/s"']

@@ -177,7 +177,7 @@ class Bench:
 
     def change(self, session: Session, path: str, value: str) -> None:
         """Set a key of the study of a session; raises `InputError` where that cannot be."""
-        from inercal.workbench.form import changed
+        from inercal.studies.text import changed
 
         if session.study is None:
             raise InputError(session.title, "found no study, expected one")

@@ -17,6 +17,7 @@ from inercal.errors import InercalError
 from inercal.estimate.rounding import short
 from inercal.report.panels import draw
 from inercal.report.sphere import hemispheres
+from inercal.studies.text import with_keys
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import (
@@ -31,7 +32,7 @@ from inercal.workbench.pages.frame import (
     told,
 )
 from inercal.workbench.pages.run import WORDS
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
 from inercal.workbench.sessions import STUDY, Session, put
 
 _MIDDLE, _END = 50, 100
