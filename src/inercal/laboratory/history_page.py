@@ -11,6 +11,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.inputs import Source
@@ -27,9 +28,10 @@ from inercal.report.style import ALARM, COLOURS, QUIET
 
 COMMAND = "history"
 
-MODEL = (
-    "x(t) = a + b t + w(t), w a random walk of variance q t; y_k = x(t_k) + c + v_k + e_k: c of u common to all "
-    "calibrations, v_k its rest, e_k of variance s^2; q and s^2 averaged over by their restricted likelihood"
+MODEL = Formula(
+    "$x(t) = a + b t + w(t)$, $w$ a random walk of variance $q t$; $y_k = x(t_k) + c + v_k + e_k$: $c$ of $u$ common "
+    "to all calibrations, $v_k$ its rest, $e_k$ of variance $s^2$; $q$ and $s^2$ averaged over by their restricted "
+    "likelihood"
 )
 
 
