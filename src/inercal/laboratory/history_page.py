@@ -14,6 +14,7 @@ from inercal.estimate.basis import Basis
 from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
+from inercal.estimate.table import aligned
 from inercal.inputs import Source
 from inercal.instruments.terms import term
 from inercal.laboratory.chart import LIMIT, Mask
@@ -143,11 +144,8 @@ def table(history: History) -> str:
     """The table as aligned text."""
     lines = [(*HEAD[:6], f"on {history.at}", *HEAD[7:]), *rows(history)]
     kept = [i for i in range(len(HEAD)) if i < 9 or any(line[i] for line in lines[1:])]
-    widths = {i: max(len(line[i]) for line in lines) for i in kept}
-    return "\n".join(
-        "  ".join(line[i].rjust(widths[i]) if 0 < i < 8 else line[i].ljust(widths[i]) for i in kept).rstrip()
-        for line in lines
-    )
+    words = {place for place, i in enumerate(kept) if not 0 < i < 8}
+    return "\n".join(aligned([[line[i] for i in kept] for line in lines], words))
 
 
 def rows_csv(history: History) -> str:
