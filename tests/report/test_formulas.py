@@ -41,6 +41,14 @@ def test_formulas_are_mathematics_and_words_stay_words():
     assert line.endswith("a mean of 3 s &lt;at&gt; 2 m/s²")
 
 
+def test_a_matrix_has_rows_columns_and_edges():
+    (line,) = clauses(Formula(r"$M = \begin{bmatrix}0 & a & b \\ -c & 0 & d\end{bmatrix} C$"))
+    assert line.count("<mtr>") == 2
+    assert line.count("<mtd>") == 6
+    assert "<mtable class='matrix'>" in line
+    assert "&#x0005B;" not in line
+
+
 def test_a_line_for_each_clause_but_none_within_brackets():
     stated = Formula("$y = S f$ (full; $S_{ij}$ the response); $b = K_0$; turns by the right-hand rule")
     assert len(clauses(stated)) == len(clauses(str(stated))) == 3

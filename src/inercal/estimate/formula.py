@@ -36,7 +36,7 @@ def _plain(latex: str) -> str:
     text = re.sub(r"\\mathrm\{(\w*)\}", r"\1", text)
     text = re.sub(r"_(?:\{([^}]*)\}|(\w))", _subscript, text)
     text = re.sub(r"\^\{([^}]*)\}", r"^\1", text).replace(r"\,", " ").replace(r"\times", "x")
-    return text.replace("\\", "")
+    return text.replace("{}", "").replace("\\", "")
 
 
 def _rows(matrix: re.Match[str]) -> str:

@@ -8,6 +8,8 @@ from html import escape
 from inercal.estimate.formula import Formula
 from inercal.report.style import plain_unit
 
+_MATRIX = r"<mtable class='matrix'>\1</mtable>"
+
 
 def clauses(model: str) -> list[str]:
     """The statements of a model, one for each clause that ends in a semicolon outside brackets.
@@ -24,7 +26,9 @@ def _clause(text: str) -> str:
     from latex2mathml.converter import convert
 
     parts = enumerate(text.split("$"))
-    return "".join(convert(part) if k % 2 else escape(plain_unit(part), quote=False) for k, part in parts)
+    html = "".join(convert(part) if k % 2 else escape(plain_unit(part), quote=False) for k, part in parts)
+    # Brackets as tall as a matrix come from few fonts: the style of a page draws its edges.
+    return re.sub(r"<mo>&#x0005B;</mo><mtable>(.*?)</mtable><mo>&#x0005D;</mo>", _MATRIX, html)
 
 
 def _parted(text: str) -> list[str]:

@@ -38,8 +38,8 @@ COMMAND = "calibrate turntable"
 MODELS = {
     "gyrowheel": Formula(
         r"$y = k_x w_x + k_y w_y + k_z w_z + \mathrm{DX}_F + \mathrm{DX}_X a_x + \mathrm{DX}_Y a_y$ "
-        r"$+ \mathrm{DX}_Z a_z + \mathrm{DX}_{XX} a_x^2 + \mathrm{DX}_{YY} a_y^2 + \mathrm{DX}_{XY} a_x a_y$ "
-        r"$+ \mathrm{DX}_{XZ} a_x a_z + \mathrm{DX}_{YZ} a_y a_z$ (axis Y: $\mathrm{kY}$, $\mathrm{DY}$); "
+        r"${}+ \mathrm{DX}_Z a_z + \mathrm{DX}_{XX} a_x^2 + \mathrm{DX}_{YY} a_y^2 + \mathrm{DX}_{XY} a_x a_y$ "
+        r"${}+ \mathrm{DX}_{XZ} a_x a_z + \mathrm{DX}_{YZ} a_y a_z$ (axis Y: $\mathrm{kY}$, $\mathrm{DY}$); "
         r"$a = \begin{bmatrix}0 & 0 & -1\end{bmatrix} C_{nb}$, the gravity reference in units of the site's gravity "
         "(an accelerometer reads $-a$); $w$ the earth rate"
     ),
@@ -49,7 +49,7 @@ MODELS = {
     ),
     "accelerometer": Formula(
         r"$y_i = K_0 + K_1 (f_i + M_{ip} f_p + M_{io} f_o + K_2 f_i^2 + K_3 f_i^3 + \mathrm{Koq} f_i |f_i|$ "
-        r"$+ \mathrm{Kip} f_i f_p + \mathrm{Kio} f_i f_o + \mathrm{Kpo} f_p f_o + \mathrm{Kpp} f_p^2 "
+        r"${}+ \mathrm{Kip} f_i f_p + \mathrm{Kio} f_i f_o + \mathrm{Kpo} f_p f_o + \mathrm{Kpp} f_p^2 "
         r"+ \mathrm{Koo} f_o^2)$, $f$ the specific force (+g up at rest), $p$ and $o$ the axes after $i$"
     ),
 }
