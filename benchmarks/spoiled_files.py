@@ -78,9 +78,9 @@ def read(name, path, folder):
 
         return {"parts": np.array([len(read_map(path).parts)])}, set()
     if name == "yaml":
-        from inercal.convert.yaml_subset import parse
+        from inercal.convert.kalibr import loaded
 
-        parse(path.read_text(errors="surrogateescape"), path)
+        loaded(path.read_text(errors="surrogateescape"), path)
         return {}, set()
     from inercal.records.read import read as read_record
 

@@ -66,8 +66,7 @@ def take(page, base, folder):
     page.wait_for_selector("[data-findings]")
     page.click("text=Design")
     page.wait_for_selector("text=18 values are predicted")
-    page.wait_for_function("document.getElementById('moment').max > 100")
-    page.evaluate("document.getElementById('moment').value = 150; inercalMoment()")
+    page.wait_for_selector("img[alt^=Direction]")
     page.locator('[aria-label="noise.angle_random_walk"]').focus()
     for _ in range(8):
         page.keyboard.press("ArrowLeft")

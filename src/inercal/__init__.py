@@ -48,7 +48,8 @@ Uncertainty
     an `inercal.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
 
 Map, lower floors first; each imports only from those above its own line
-    arrays, errors, inputs     the type of arrays; what goes wrong; files that a result rests on
+    addresses, arrays,         addresses without secrets; the type of arrays; what goes wrong; files that a result
+    errors, inputs             rests on
     findings, units            what is said of a recording or result, and the verdict; texts with units
     keys                       what a study says of a field of settings: key, unit, default, bounds, meaning
     geometry                   rotations, earth, site

@@ -12,6 +12,7 @@ from scipy import stats
 from inercal.estimate.identifiability import identify, in_words
 from inercal.estimate.least_squares import least_squares, whiten
 from inercal.geometry.rotations import elementary
+from inercal.validate.foundation import LONGLEY, LONGLEY_CERTIFIED, NORRIS, NORRIS_CERTIFIED
 from rows import for_each
 
 
@@ -71,53 +72,20 @@ def test_gum_h3_calibration_of_a_thermometer():
     assert np.sqrt(at_30 @ covariance @ at_30) == pytest.approx(0.0041, abs=5e-5)
 
 
-NORRIS = """
-0.1 0.2  338.8 337.4  118.1 118.2  888.0 884.6  9.2 10.1  228.1 226.5  668.5 666.3  998.5 996.3  449.1 448.6
-778.9 777.0  559.2 558.2  0.3 0.4  0.1 0.6  778.1 775.5  668.8 666.9  339.3 338.0  448.9 447.5  10.8 11.6
-557.7 556.0  228.3 228.1  998.0 995.8  888.8 887.6  119.6 120.2  0.3 0.3  0.6 0.3  557.6 556.8  339.3 339.1
-888.0 887.2  998.5 999.0  778.9 779.0  10.2 11.1  117.6 118.3  228.9 229.2  668.4 669.1  449.2 448.9  0.2 0.5
-"""
-
-LONGLEY = """
-60323 83.0 234289 2356 1590 107608 1947   61122 88.5 259426 2325 1456 108632 1948
-60171 88.2 258054 3682 1616 109773 1949   61187 89.5 284599 3351 1650 110929 1950
-63221 96.2 328975 2099 3099 112075 1951   63639 98.1 346999 1932 3594 113270 1952
-64989 99.0 365385 1870 3547 115094 1953   63761 100.0 363112 3578 3350 116219 1954
-66019 101.2 397469 2904 3048 117388 1955  67857 104.6 419180 2822 2857 118734 1956
-68169 108.4 442769 2936 2798 120445 1957  66513 110.8 444546 4681 2637 121950 1958
-68655 112.6 482704 3813 2552 123366 1959  69564 114.2 502601 3931 2514 125368 1960
-69331 115.7 518173 4806 2572 127852 1961  70551 116.9 554894 4007 2827 130081 1962
-"""
-
-
 @pytest.mark.parametrize(
-    ("data", "beta", "sd", "residual_sd"),
-    [
-        (
-            NORRIS,
-            [-0.262323073774029, 1.00211681802045],
-            [0.232818234301152, 0.429796848199937e-3],
-            0.884796396144373,
-        ),
-        (
-            LONGLEY,
-            [-3482258.63459582, 15.0618722713733, -0.358191792925910e-1, -2.02022980381683,
-             -1.03322686717359, -0.511041056535807e-1, 1829.15146461355],
-            [890420.383607373, 84.9149257747669, 0.334910077722432e-1, 0.488399681651699,
-             0.214274163161675, 0.226073200069370, 455.478499142212],
-            304.854073561965,
-        ),
-    ],
+    ("data", "certified"),
+    [(NORRIS, NORRIS_CERTIFIED), (LONGLEY, LONGLEY_CERTIFIED)],
     ids=["Norris", "Longley"],
-)  # fmt: skip
-def test_certified_values_of_nist(data, beta, sd, residual_sd):
+)
+def test_certified_values_of_nist(data, certified):
     """NIST Statistical Reference Datasets, linear regression: 15 certified digits."""
+    beta, sd, residual_sd = np.split(certified, [len(certified) // 2, len(certified) - 1])
     rows = np.array(data.split(), dtype=float).reshape(-1, len(beta))
     A = np.column_stack([np.ones(len(rows)), rows[:, 1:]])
     fit = least_squares(A, rows[:, 0], [f"B{i}" for i in range(len(beta))])
     np.testing.assert_allclose(fit.beta, beta, rtol=1e-9)
     np.testing.assert_allclose(np.sqrt(fit.s2 * np.diag(fit.unit_covariance)), sd, rtol=1e-9)
-    assert np.sqrt(fit.s2) == pytest.approx(residual_sd, rel=1e-9)
+    assert np.sqrt(fit.s2) == pytest.approx(residual_sd[0], rel=1e-9)
 
 
 def test_a_polynomial_of_degree_five():

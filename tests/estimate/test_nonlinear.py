@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.estimate.least_squares import least_squares, solve
+from inercal.validate.foundation import MISRA1A, MISRA1A_CERTIFIED
 from rows import for_each
 
 T = np.linspace(0.0, 2.0, 12)
@@ -38,12 +39,6 @@ def differences(function, x, step=1e-6):
 
 # Published numbers and closed forms.
 
-MISRA1A = np.array(
-    [(10.07, 77.6), (14.73, 114.9), (17.94, 141.1), (23.93, 190.8), (29.61, 239.9), (35.18, 289.0),
-     (40.02, 332.8), (44.82, 378.4), (50.76, 434.8), (55.05, 477.3), (61.01, 536.8), (66.40, 593.1),
-     (75.47, 689.1), (81.78, 760.0)]
-)  # fmt: skip
-
 
 @pytest.mark.parametrize("start", [(500.0, 0.0001), (250.0, 0.0005)])
 def test_certified_values_of_misra1a(start):
@@ -57,7 +52,7 @@ def test_certified_values_of_misra1a(start):
         np.array(start),
     )
     assert fit.converged
-    np.testing.assert_allclose(fit.x, [2.3894212918e02, 5.5015643181e-04], rtol=1e-8)
+    np.testing.assert_allclose(fit.x, MISRA1A_CERTIFIED, rtol=1e-8)
     assert fit.chi2 == pytest.approx(1.2455138894e-01, rel=1e-10)
     assert fit.dof == 12
     s = np.sqrt(fit.chi2 / fit.dof)

@@ -1,4 +1,4 @@
-"""Plans before the test: u against the searches', levers against keys of a study, courses in closed form."""
+"""Plans before the test: u against the searches', levers against keys of a study, verticals against the models'."""
 
 from dataclasses import replace
 
@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 import inercal as ic
-from inercal.aoa.motion import course as pitch_of
-from inercal.aoa.motion import duration
 from inercal.errors import InercalError
 from inercal.examples import FOLDER
-from inercal.face.foresight import course, foresight
+from inercal.face.foresight import foresight, verticals
 from inercal.face.study import read_study
 from inercal.geometry.rotations import to_matrix
 from inercal.rigs.plans import named
@@ -83,33 +81,26 @@ def test_shares_of_positions_are_those_of_the_gain(studies):
     np.testing.assert_allclose(found.shares(np.ones(len(found.levers))), expected, atol=1e-4)
 
 
-def test_gimbals_stand_as_the_kinematics_have_them(studies):
-    settings, shown = studies("selfcal").settings, course(studies("selfcal"))
+def test_the_vertical_of_a_platform_is_that_of_the_kinematics(studies):
+    settings, shown = studies("selfcal").settings, verticals(studies("selfcal"))
     world = settings.world
     vertical = world.up / np.linalg.norm(world.up)
     at = settings.plan.angles()[np.cumsum([0, *map(settings.plan.steps, settings.plan.moves)])]
-    for stop, angles in zip(shown.stops, at, strict=True):
-        C_bp = to_matrix(np.array(attitude(angles, world.axes, world.signs)))
-        np.testing.assert_allclose(shown.up[stop], C_bp.T @ vertical, atol=1e-12)
-    assert len(shown.words) == len(shown.poses)
+    expected = [to_matrix(np.array(attitude(angles, world.axes, world.signs))).T @ vertical for angles in at]
+    np.testing.assert_allclose(shown, expected, atol=1e-12)
 
 
 def test_the_vertical_of_a_table_and_of_turns_is_that_of_their_models(studies):
-    settings, shown = studies("turntable").settings, course(studies("turntable"))
+    settings = studies("turntable").settings
     C = settings.chain.attitude(settings.plan.angles)
-    np.testing.assert_allclose(shown.up[shown.stops], C[:, 2, :], atol=1e-12)
-    settings, shown = studies("strapdown").settings, course(studies("strapdown"))
+    np.testing.assert_allclose(verticals(studies("turntable")), C[:, 2, :], atol=1e-12)
+    settings = studies("strapdown").settings
     along = turn_bounds(Pieces(settings), settings.plan)
-    np.testing.assert_allclose(shown.up[shown.stops], along.up, atol=1e-9)
+    np.testing.assert_allclose(verticals(studies("strapdown")), along.up, atol=1e-9)
 
 
-def test_sensors_of_a_model_rise_by_the_sine_that_they_read(studies):
-    study = studies("aoa")
-    plan, shown = study.settings.motion, course(study)
-    t = np.linspace(0.0, duration(plan), len(shown.poses))
-    theta = pitch_of(plan, np.random.default_rng(0))(t)[0]
-    rise = (shown.poses[:, 0] @ shown.sensors[:, 1].T)[:, 2]
-    np.testing.assert_allclose(rise, np.sin(theta[:, None] - study.settings.layout.angle), atol=1e-12)
+def test_a_model_in_motion_has_no_stops(studies):
+    assert verticals(studies("aoa")).shape == (0, 3)
 
 
 def test_a_plan_that_cannot_be_judged_is_refused_in_a_sentence(studies, tmp_path):

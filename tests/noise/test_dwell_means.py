@@ -8,6 +8,7 @@ from scipy import stats
 
 from inercal.instruments.noise import BIAS_FLOOR
 from inercal.noise.dwell_means import AllanFit, equivalent_dof, fit, overlapping_variance, running_sums
+from inercal.validate.noise import thousand
 
 
 def flicker(rng, n, channels, B, interval):
@@ -31,11 +32,7 @@ def test_nbs14():
 
 def test_the_1000_point_set_of_nist():
     """NIST SP 1065, section 12.4, table 31: overlapping deviation of 1000 numbers of a stated generator."""
-    state, values = 1234567890, []
-    for _ in range(1000):
-        values.append(state / 2147483647)
-        state = 16807 * state % 2147483647
-    x = np.array(values)
+    x = thousand()
     assert x.mean() == pytest.approx(4.897745e-01, abs=5e-8)
     assert x.std(ddof=1) == pytest.approx(2.884664e-01, abs=5e-8)
     for m, deviation in ((1, 2.922319e-01), (10, 9.159953e-02), (100, 3.241343e-02)):

@@ -12,23 +12,9 @@ import pytest
 
 from inercal.noise.coefficients import noise_coefficients
 from inercal.noise.deviation import allan_deviation
+from inercal.validate.noise import ALLANTOOLS, TAU
 
 ROWS, INTERVAL = 184718, 0.01
-TAU = (0.01, 0.2, 1.0, 10.0, 100.0, 500.0)
-PUBLISHED = {
-    "gyro_x": (53.11216154222367, 55.28366668891407, 17.352969950226534, 8.420291462833005, 2.0748463944562054,
-               0.3194956678121396),
-    "gyro_y": (56.81165185739366, 128.1875331885039, 60.656479319263276, 14.691978514290197, 2.66111878764186,
-               0.4537886630546319),
-    "gyro_z": (34.17169766901764, 50.38408587559926, 8.706210606352899, 1.4944848730466624, 0.2505152923013912,
-               0.04448235426420036),
-    "acc_x": (0.14307288711849164, 0.014604474528502432, 0.0033162295996531544, 0.003313031327114284,
-              0.004916001860501169, 0.0064184533246514726),
-    "acc_y": (0.21979115672086524, 0.011763481128776352, 0.002130768502095728, 0.002241797729258805,
-              0.003906793938657779, 0.007648501098920952),
-    "acc_z": (0.15447873140045076, 0.015491746861201043, 0.0021488211484324503, 0.0002479537594927087,
-              8.300677745884409e-05, 0.00015205098080045296),
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +30,7 @@ def test_deviations(rates):
     found = allan_deviation(rates, INTERVAL, TAU)
     assert found.terms[0, 0] == ROWS - 1
     assert found.terms[-1, 0] == 84719
-    for channel, values in enumerate(PUBLISHED.values()):
+    for channel, values in enumerate(ALLANTOOLS):
         np.testing.assert_allclose(found.deviation[:, channel], values, rtol=1e-10)
 
 

@@ -21,22 +21,9 @@ from inercal.imu.aided.calibration import calibrate_aided
 from inercal.imu.settings import ImuSettings
 from inercal.records.read import read
 from inercal.studies.imu import AidedTable, aided_settings
+from inercal.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
 
-ACC = np.array(
-    [
-        [1.00761037725147, 0.001216750164928284, 0.004438632327454257],
-        [0.0033367432737426684, 1.0149407907315762, -0.0020515826376580086],
-        [0.003130677016509014, -0.008540957393017247, 0.9744701018416592],
-    ]
-)
-GYRO = np.array(
-    [
-        [1.0176405234596766, 0.004001572083672233, 0.009787379841057393],
-        [0.022408931992014578, 1.0186755799014997, -0.00977277879876411],
-        [0.009500884175255894, -0.001513572082976979, 0.9989678114820644],
-    ]
-)
-ACC_BIAS = np.array([0.13041039201706542, 0.17227293074811315, -0.1481500012389673])  # mean over the test
+ACC, GYRO, ACC_BIAS = map(np.array, (TABLE_ACC, TABLE_GYRO, TABLE_ACC_BIAS))  # the bias: mean over the test
 GYRO_BIAS = np.array([0.0007962550847312129, 0.0002793371758986746, 0.0028202067690031776])  # at the start
 GYRO_WALK = 1.6160456036984532e-06  # rad/s/sqrt(s)
 PEER = {"gyro": 4.4216e-4, "acc": 8.6109e-5}  # largest errors of pyins' own calibration

@@ -18,13 +18,9 @@ from inercal.findings import Status
 from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
 from inercal.imu.multiposition.poses import choose, sweep
 from inercal.imu.recording import prepare
+from inercal.validate.imu import TK_BIAS, TK_GYRO, TK_SCALE, TK_T
 
-IMU_TK = {
-    "scale": [414.4588739254017, 412.01046845347594, 414.6486622431341],
-    "T": [-0.00335929903323467, -0.00890639474323122, -0.0213341193851847],
-    "bias": [33124.1825645617, 33275.1794341807, 32364.4156494431],
-    "gyro": [4777.955828030662, 4764.206560263323, 4773.65741055623],
-}
+IMU_TK = {"scale": TK_SCALE, "T": TK_T, "bias": TK_BIAS, "gyro": TK_GYRO}
 # a = T K (raw - offset) - b, so that the output at zero is offset + (T K)^-1 b
 _OFFSET, _B = (
     [33123.0, 33276.0, 32360.0],

@@ -1,12 +1,12 @@
-"""The form changes one key of a study's text, and nothing else; comments stay."""
+"""The form shows each key of a study, and sets it alone."""
 
 import tomllib
 
 import pytest
 
-from inercal.errors import InputError
 from inercal.studies.template import template
-from inercal.workbench.form import as_toml, changed, problem, tables
+from inercal.studies.text import changed
+from inercal.workbench.form import as_toml, problem, tables
 from inercal.workbench.sessions import COMMANDS
 
 
@@ -32,35 +32,6 @@ def test_every_key_of_a_new_study_takes_its_example_and_leaves_the_others(kind):
         for name in before:  # other tables are untouched
             if name != key.path.split(".")[0]:
                 assert after[name] == before[name]
-
-
-def test_a_key_keeps_its_comment_and_its_place():
-    text = '[site]\nlatitude = "?"    # north # positive\nheight = "100 m"\n'
-    made = changed(text, "site.latitude", '"45 # deg"')
-    assert made.splitlines()[1].endswith("# north # positive")
-    assert tomllib.loads(made) == {"site": {"latitude": "45 # deg", "height": "100 m"}}
-
-
-def test_a_commented_key_and_its_table_come_into_force():
-    text = '[site]\nlatitude = "45 deg"\n\n# [item]    # the instrument\n# serial = "0042"    # its number\n'
-    made = changed(text, "item.serial", '"7"')
-    assert tomllib.loads(made) == {"site": {"latitude": "45 deg"}, "item": {"serial": "7"}}
-    assert made.count("serial") == 1
-
-
-def test_a_table_within_a_line_is_changed_there():
-    text = '[columns]\nacc_x = { from = 1, unit = "m/s^2" }\nacc_y = { from = 2, unit = "m/s^2" }\n'
-    made = changed(text, "columns.acc_x.unit", '"g"')
-    assert tomllib.loads(made)["columns"] == {
-        "acc_x": {"from": 1, "unit": "g"},
-        "acc_y": {"from": 2, "unit": "m/s^2"},
-    }
-
-
-@pytest.mark.parametrize("value", ['"open', "1 2", "}", "\n[other]\nx = 1"])
-def test_a_value_that_is_no_toml_is_refused(value):
-    with pytest.raises(InputError):
-        changed('[site]\nlatitude = "45 deg"\n', "site.latitude", value)
 
 
 def test_a_study_is_judged_in_one_sentence():

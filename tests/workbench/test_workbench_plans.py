@@ -5,11 +5,10 @@ import pytest
 
 from inercal.errors import InputError
 from inercal.examples import FOLDER
-from inercal.face.foresight import course
+from inercal.face.foresight import verticals
 from inercal.face.study import read_study
-from inercal.workbench.form import changed
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
-from inercal.workbench.scenes import gimbals, motion, sphere
+from inercal.studies.text import with_keys
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
 
 FILES = {
     "turntable": "gyro.toml",
@@ -36,7 +35,7 @@ def test_lines_of_a_plan_make_the_same_plan(kind, study):
         lines = lines_of(study(kind, text))
         again = with_lines(kind, text, lines)
         assert lines_of(study(kind, again)) == lines
-        np.testing.assert_allclose(course(study(kind, text)).up, course(study(kind, again)).up, atol=1e-9)
+        np.testing.assert_allclose(verticals(study(kind, text)), verticals(study(kind, again)), atol=1e-9)
 
 
 def test_a_line_that_is_none_is_refused_and_one_added_is_there(study):
@@ -64,26 +63,3 @@ def test_what_a_search_wrote_becomes_the_plan(study):
     found = '# found\n[plan]\nturns = [\n    ["x", "30 deg"],\n]\nrate = "2 deg/s"\n'
     plan = study("selfcal", with_found("selfcal", (FOLDER / "selfcal.toml").read_text(), found)).settings.plan
     np.testing.assert_allclose(np.degrees([plan.rate, plan.moves[0].angle]), [2.0, 30.0])
-
-
-def test_a_value_over_several_lines_is_changed_as_a_whole():
-    text = '[plan]\nturns = [\n    ["z", "1 deg"],  # a ] in a remark\n    ["x", "2 deg"],\n]\nrate = "1 deg/s"\n'
-    assert changed(text, "plan.turns", '[["y", "3 deg"]]').splitlines() == [
-        "[plan]", 'turns = [["y", "3 deg"]]', 'rate = "1 deg/s"',
-    ]  # fmt: skip
-    out = changed(text, "plan.turns", "")
-    assert [line for line in out.splitlines() if not line.startswith("#")] == ["[plan]", 'rate = "1 deg/s"']
-
-
-@pytest.mark.parametrize("kind", ["turntable", "selfcal", "aoa"])
-def test_scenes_move_as_the_course_does(kind, study):
-    shown = course(study(kind, (FOLDER / FILES[kind]).read_text()))
-    scenes = {"a": gimbals(shown), "b": sphere(shown)}
-    told = motion(shown, scenes)
-    assert len(told["words"]) == len(told["poses"]) == len(told["up"])
-    for trace, (body, points) in scenes["a"].moving.items():
-        drawn = scenes["a"].figure["data"][trace]
-        first = points @ shown.poses[0, body].T
-        np.testing.assert_allclose(
-            np.array([drawn["x"], drawn["y"], drawn["z"]], dtype=float), first.T, atol=2e-5
-        )

@@ -1,4 +1,4 @@
-"""Sensors of a model before they are built in: u of the angle with better or worse ones, and the model in motion."""
+"""Sensors of a model before they are built in: u of the angle with better or worse ones."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.aoa.design import courses_of, sample_bound, settled_u, undisturbed
-from inercal.aoa.motion import course as pitch_of
-from inercal.aoa.motion import duration
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.designs.foresight import Course, Foresight, Lever
+from inercal.designs.foresight import Foresight, Lever
 from inercal.errors import StudyError
-from inercal.geometry.rotations import elementary
 from inercal.instruments.terms import sized
 
 _LEVERS = (
@@ -26,8 +23,6 @@ _LEVERS = (
     ("prior", "lever_common", "m", "of the pivot"),
 )
 """Table and key of what is scaled, its SI unit, and what it says."""
-
-_MOMENTS = 240
 
 
 def foresight(settings: AoaSettings) -> Foresight:
@@ -52,18 +47,6 @@ def foresight(settings: AoaSettings) -> Foresight:
     return Foresight(("theta, fusion", "theta, one sample"), ("deg", "deg"), size, levers, u)
 
 
-def course(settings: AoaSettings) -> Course:
-    """The model in the motion of the study, its sensors on it. Raises `StudyError` without a motion."""
-    if settings.motion is None:
-        raise StudyError("motion", "missing, expected the motion that the angle goes through")
-    t = np.linspace(0.0, duration(settings.motion), _MOMENTS)
-    theta = pitch_of(settings.motion, np.random.default_rng(0))(t)[0]
-    layout = settings.layout
-    places = np.column_stack([layout.r, np.zeros(len(layout.r)), layout.z])
-    looks = np.column_stack([np.cos(layout.angle), np.zeros(len(layout.r)), -np.sin(layout.angle)])
-    words = tuple(
-        f"{time:.4g} s: theta {angle:.3g} deg"
-        for time, angle in zip(t.tolist(), np.degrees(theta).tolist(), strict=True)
-    )
-    poses = np.asarray(elementary("y", -theta))[:, None]
-    return Course(words, poses, np.zeros((1, 3)), np.zeros(0, dtype=int), np.stack([places, looks], axis=1))
+def verticals(settings: AoaSettings) -> Array:
+    """No directions (0, 3): a model in motion has no stops."""
+    return np.zeros((0, 3))

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from inercal.cli.options import FileOutput, StoreOption
 from inercal.cli.outcome import emit
 from inercal.errors import InputError
+from inercal.estimate.table import aligned
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
@@ -225,11 +226,4 @@ def _table(found: Certificate) -> list[str]:
         for q in each.quantities:
             U, k = ("" if math.isnan(number) else repr(number) for number in (q.U, q.k))
             rows.append((q.label or q.name, repr(q.value), U, k, q.unit))
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    return [
-        "  ".join(
-            cell.ljust(width) if i in (0, 4) else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    return aligned(rows, (0, 4))

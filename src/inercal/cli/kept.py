@@ -12,6 +12,7 @@ from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit
 from inercal.errors import InercalError, InputError
+from inercal.estimate.table import aligned
 
 if TYPE_CHECKING:
     import subprocess
@@ -68,7 +69,7 @@ def instruments(*, store: StoreOption = None, output: Output = Output()) -> None
     words = f"{counted(len(rows), 'instrument')} in {opened.where}"
     head = ("maker", "model", "serial", "owner", "results", "last")
     table = [head, *((*(str(row[key]) for key in head[:5]), (row["last"] or "")[:10]) for row in rows)]
-    text = "\n".join([*(_aligned(table) if rows else ()), words])
+    text = "\n".join([*(aligned(table, range(6)) if rows else ()), words])
     emit(without_coefficients("instruments", words, {"instruments": rows}), text, output)
 
 
@@ -109,7 +110,7 @@ def results(
         {**vars(each), "instrument": None if each.instrument is None else vars(each.instrument)}
         for each in found
     ]
-    text = "\n".join([*(_aligned(table) if found else ()), words])
+    text = "\n".join([*(aligned(table, range(6)) if found else ()), words])
     emit(without_coefficients("results", words, {"results": rows}), text, output)
 
 
@@ -223,7 +224,7 @@ def rerun(
     for row in rows:
         old, now = (rounded(value, row.u)[0] for value in (row.old, row.new))
         table.append((row.name, old, now, rounded(row.u, row.u)[0], row.unit, row.same))
-    text = "\n".join([*(_aligned(table) if rows else ()), words])
+    text = "\n".join([*(aligned(table, range(6)) if rows else ()), words])
     data = {"id": found.listed.id, "sound": sound, "coefficients": [vars(row) for row in rows]}
     emit(without_coefficients("rerun", words, data), text, output)
     return 0 if sound else EXIT_BAD_VERDICT
@@ -241,11 +242,3 @@ def _made_again(arguments: Sequence[str], folder: Path) -> subprocess.CompletedP
     return subprocess.run(
         command, cwd=folder, env=own, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
     )
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Rows as lines of aligned columns."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-    ]

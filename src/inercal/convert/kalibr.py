@@ -22,20 +22,19 @@ kalibr, ICRA 2016.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.convert import yaml_subset
 from inercal.convert.convention import (
     FORCE,
     RATE,
     Convention,
     Terms,
     Units,
-    digits,
     one_text,
     per,
     triad_of_gain,
@@ -60,6 +59,11 @@ _ARMS = ("rx_i", "ry_i", "rz_i")
 
 _TOLERANCE = 1e-6
 """Of the orthogonality of rotations in a file."""
+
+_LONGEST, _DEEPEST = 1 << 20, 50
+"""Characters and levels of a file at most."""
+
+_EXPECTED = "expected keys and numbers (YAML)"
 
 
 def terms(model: ImuModel) -> Terms:
@@ -119,30 +123,23 @@ def _notes(terms: Terms) -> tuple[Finding, ...]:
 
 def render(terms: Terms, units: Units) -> dict[str, str]:
     """A file as `kalibr_calibrate_imu_camera` writes it."""
+    import yaml
+
     pose = np.eye(4)
     pose[:3, :3] = terms["C_i_b"]
-    lines = [f"# {units_line(units)}", "imu0:", *_rows("T_i_b", pose, 2)]
-    for sensor in ("accelerometers", "gyroscopes"):
-        lines.append(f"  {sensor}:")
-        for term, (place, key) in _PLACES.items():
-            if place == sensor:
-                lines += _rows(key, terms[term], 4)
-    return {"": "\n".join([*lines, "  model: scale-misalignment", "  time_offset: 0.0"]) + "\n"}
-
-
-def _rows(key: str, array: Array, indent: int) -> list[str]:
-    """A key with a vector, or the rows of a matrix below it."""
-    space = " " * indent
-    if array.ndim == 1:
-        return [f"{space}{key}: [{', '.join(digits(array))}]"]
-    return [f"{space}{key}:", *(f"{space}- [{', '.join(digits(row))}]" for row in array)]
+    imu: dict[str, Any] = {"T_i_b": (pose + 0.0).tolist(), "accelerometers": {}, "gyroscopes": {}}
+    for term, (place, key) in _PLACES.items():
+        imu[place][key] = (terms[term] + 0.0).tolist()  # + 0.0 takes the sign off a zero
+    imu |= {"model": "scale-misalignment", "time_offset": 0.0}
+    text = yaml.safe_dump({"imu0": imu}, default_flow_style=None, sort_keys=False, width=math.inf)
+    return {"": f"# {units_line(units)}\n{text}"}
 
 
 def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     """Terms; without keys ``b`` those of the biases are left out. Outputs are in SI units unless said otherwise."""
     where, text = one_text(texts, "kalibr")
-    whole = yaml_subset.parse(text, where)
-    imus = [key for key in whole if key.startswith("imu")] if isinstance(whole, Mapping) else []
+    whole = loaded(text, where)
+    imus = [key for key in whole if str(key).startswith("imu")] if isinstance(whole, Mapping) else []
     if len(imus) != 1 or not isinstance(whole[imus[0]], Mapping):
         raise InputError(
             where, f"found {len(imus)} keys imu0, imu1, ..., expected one with what belongs to it"
@@ -176,11 +173,42 @@ def parse(texts: Sequence[tuple[object, str]]) -> tuple[Terms, Units]:
     return matrices, {"acc": FORCE, "gyro": RATE} | units_in(text)
 
 
+def loaded(text: str, where: object) -> Any:
+    """Dicts, lists, numbers and texts of a YAML file.
+
+    Raises `InputError` naming ``where`` for other YAML, for aliases, by which a short file is a huge one, and beyond
+    1 MiB or 50 levels.
+    """
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    if len(text) > _LONGEST:
+        raise InputError(where, f"found {len(text)} characters, expected at most {_LONGEST} (YAML)")
+    try:
+        depth = 0
+        for event in yaml.parse(text, loader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if isinstance(event, yaml.AliasEvent) or depth > _DEEPEST:
+                raise InputError(
+                    f"{where}, line {event.start_mark.line + 1}",
+                    f"found {'an alias' if depth <= _DEEPEST else f'more than {_DEEPEST} levels'}, {_EXPECTED}",
+                )
+        value = yaml.load(text, loader)
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        at = where if mark is None else f"{where}, line {mark.line + 1}"
+        found = getattr(error, "problem", None) or str(error)
+        raise InputError(at, f"{found.splitlines()[0][:80]}, {_EXPECTED}") from error
+    if value is None:
+        raise InputError(where, f"found nothing in it, {_EXPECTED}")
+    return value
+
+
 def _array(value: Any, shape: tuple[int, ...], key: str, where: object) -> Array:
     """An array of that shape."""
     try:
         array = np.array(value, dtype=float)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError):
         array = np.zeros(0)
     if array.shape != shape:
         raise InputError(where, f"{key} is not of {' x '.join(map(str, shape))} numbers, expected these")

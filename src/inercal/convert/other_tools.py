@@ -18,6 +18,7 @@ from inercal.convert.correct import ImuModel, imu_model
 from inercal.errors import InputError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import GYRO_G_SENSITIVITY, TERMS
@@ -33,7 +34,9 @@ CONVENTIONS: dict[str, Convention] = {
 _ROUNDING = 1e-14
 """Misalignment [rad] that a turn of the axes and back leaves of zero."""
 
-MODEL = "y = S M x + b, and for the gyro + G f (K1, M, K0; S, T, D_F, G), frame that of the file"
+MODEL = Formula(
+    "$y = S M x + b$, and for the gyro $+ G f$ ($K_1$, $M$, $K_0$; $S$, $T$, $D_F$, $G$), frame that of the file"
+)
 
 
 @dataclass(frozen=True)

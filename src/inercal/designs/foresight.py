@@ -1,13 +1,11 @@
-"""A test before it is made: the uncertainties that its plan makes expect, and its course as one can look at it."""
+"""A test before it is made: the uncertainties that its plan makes expect."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.arrays import Array
 
@@ -65,34 +63,3 @@ class Foresight:
             up, down = (np.log(self.u(factors * step)) for step in steps)
             found[k] = (up - down) / (2.0 * _STEP)
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """A test from moment to moment.
-
-    Attributes
-    ----------
-    words : tuple of str
-        What is at each of the m moments, for people.
-    poses : (m, k, 3, 3)
-        Attitude of what each of k joints carries, outer first, in axes of which the third points up; the last is the
-        instrument.
-    axes : (k, 3)
-        Axis of each joint in what it carries; zero where there is none.
-    stops : (r,) int
-        Moments at which it rests.
-    sensors : (s, 2, 3)
-        Place and direction of sensors on what moves; none where they sit at one point.
-    """
-
-    words: tuple[str, ...]
-    poses: Array
-    axes: Array
-    stops: NDArray[np.integer[Any]]
-    sensors: Array
-
-    @property
-    def up(self) -> Array:
-        """(m, 3) the vertical on the axes of the instrument."""
-        return np.asarray(self.poses[:, -1, 2, :])

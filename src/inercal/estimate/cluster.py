@@ -81,6 +81,7 @@ class Cluster:
             def submitted(chunk: range) -> Any:
                 return client.submit(_done, name, chunk, pure=False)
 
+            # Not by Client.get_executor: where an answer is lost on the way, its futures are never done.
             futures = {submitted(chunk): (chunk, 0) for chunk in chunks}
             finished = distributed.as_completed(list(futures))
             try:

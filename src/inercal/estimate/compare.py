@@ -23,6 +23,7 @@ from inercal.errors import InputError, QuantityError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
 from inercal.estimate.common_sources import Taken, common_sources, other_instrument
+from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import in_words
 from inercal.estimate.result import Estimate, Parameter
 from inercal.findings import EVERYTHING, Finding, Status
@@ -34,9 +35,9 @@ COMMAND = "compare"
 FAMILY = 0.05
 """Probability of the verdict "inconsistent" where nothing moved; half for each coefficient alone, half for all."""
 
-MODEL = (
-    "d = second - first; var(d) = var(first) + var(second) less twice the covariance by common sources; E_n = |d| / "
-    "U(d); jointly chi2 = d' V^-1 d with V the covariance of the differences"
+MODEL = Formula(
+    r"$d$ = second - first; var($d$) = var(first) + var(second) less twice the covariance by common sources; "
+    r"$E_n = |d| / U(d)$; jointly $\chi^2 = d^T V^{-1} d$ with $V$ the covariance of the differences"
 )
 
 REFERENCES = (

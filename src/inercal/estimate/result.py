@@ -16,6 +16,7 @@ from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import BudgetItem, Uncertainty
 from inercal.estimate.rounding import rounded
 from inercal.estimate.shown import budget_shown, in_words, statistics_in_words, units_shown
+from inercal.estimate.table import aligned
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.inputs import Source
 from inercal.instruments.terms import resting_on
@@ -281,14 +282,7 @@ class Estimate:
             )
             for p in self.parameters.values()
         ]
-        widths = [max(len(row[i]) for row in rows) for i in range(6)]
-        return "\n".join(
-            "  ".join(
-                cell.ljust(width) if i in (0, 5) else cell.rjust(width)
-                for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-            ).rstrip()
-            for row in rows
-        )
+        return "\n".join(aligned(rows, (0, 5)))
 
 
 def without_coefficients(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 
 
@@ -24,15 +25,19 @@ class Table:
         if not self.rows:
             return ""
         head = tuple(f"{name} [{unit}]" if unit else name for name, unit in self.columns)
-        lines = (head, *self.rows)
-        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-        return "\n".join(
-            "  ".join(
-                cell.ljust(width) if i < self.words else cell.rjust(width)
-                for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-            ).rstrip()
-            for line in lines
-        )
+        return "\n".join(aligned([head, *self.rows], range(self.words)))
+
+
+def aligned(rows: Sequence[Sequence[str]], words: Container[int] = (0,), between: str = "  ") -> list[str]:
+    """Rows of cells as lines of aligned columns; those of ``words`` begin at the left, the others end at the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        between.join(
+            cell.ljust(width) if i in words else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
 
 
 def heads(*texts: str) -> tuple[tuple[str, str], ...]:

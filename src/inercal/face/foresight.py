@@ -1,11 +1,12 @@
-"""A test before it is made, in Python: the uncertainties that its plan makes expect, and its course."""
+"""A test before it is made, in Python: the uncertainties that its plan makes expect, and where it stops."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import Any
 
-from inercal.designs.foresight import Course, Foresight
+from inercal.arrays import Array
+from inercal.designs.foresight import Foresight
 from inercal.errors import StudyError
 from inercal.face.study import Study
 
@@ -26,9 +27,12 @@ def foresight(study: Study) -> Foresight:
     return found
 
 
-def course(study: Study) -> Course:
-    """The course of the test that a study plans. Raises `StudyError` for a study without one."""
-    found: Course = _asked(study, "course")
+def verticals(study: Study) -> Array:
+    """Directions (r, 3) of the vertical on the instrument at each stop that a study plans; none of a model in motion.
+
+    Raises `StudyError` for a study without a plan.
+    """
+    found: Array = _asked(study, "verticals")
     return found
 
 

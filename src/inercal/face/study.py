@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,7 +15,7 @@ from inercal.errors import InputError, StudyError
 from inercal.estimate.result import Estimate, without_coefficients
 from inercal.records.places import counted_names
 from inercal.records.record import Record
-from inercal.units import shown
+from inercal.studies.text import toml
 
 KINDS = ("imu", "strapdown", "turntable", "selfcal", "aoa")
 """The kinds of study, one for each system, as the commands name them."""
@@ -83,7 +82,7 @@ class Study:
         lines = [f"Study of kind {self.kind}, {self.path or 'by keywords'}"]
         for table, keys in self.keys.items():
             if isinstance(keys, Mapping):
-                text = ", ".join(f"{key} = {_toml(value)}" for key, value in keys.items())
+                text = ", ".join(f"{key} = {toml(value)}" for key, value in keys.items())
                 lines.append(f"  [{table}] {text}")
         if len(lines) > 10:
             rest = counted_names([line.split("]")[0].strip(" [") for line in lines[9:]], 6)
@@ -189,37 +188,12 @@ def _overrides(tables: Mapping[str, Any], above: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield from _overrides(value, f"{above}{key}.")
         else:
-            yield f"{above}{key}={_toml(value)}"
+            yield f"{above}{key}={toml(value)}"
 
 
 def _document(keys: Mapping[str, Any]) -> str:
     """Keywords as a TOML document."""
-    return "\n".join(f"{json.dumps(key)} = {_toml(value)}" for key, value in keys.items())
-
-
-def _toml(value: Any) -> str:
-    """A value as TOML; refused where it has none."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case str() | int():
-            return json.dumps(value, ensure_ascii=False)
-        case float():
-            return repr(value)
-        case Path():
-            return json.dumps(str(value), ensure_ascii=False)
-        case Mapping():
-            inner = (
-                f"{key if str(key).isidentifier() else json.dumps(key)} = {_toml(v)}"
-                for key, v in value.items()
-            )
-            return "{ " + ", ".join(inner) + " }"
-        case list() | tuple():
-            return "[" + ", ".join(map(_toml, value)) + "]"
-        case _ if hasattr(value, "tolist"):  # of NumPy
-            return _toml(value.tolist())
-        case _:
-            raise StudyError("study", f"found {shown(value)}, expected a text, a number, a list or a table")
+    return "\n".join(f"{toml(key)} = {toml(value)}" for key, value in keys.items())
 
 
 Progress = Callable[[str], None]

@@ -10,6 +10,7 @@ import numpy as np
 
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
+from inercal.estimate.table import aligned
 from inercal.fleet.capability import LEVEL, Index, Spread
 from inercal.fleet.fleet import Fleet, Trend
 from inercal.laboratory.specification import group_of
@@ -71,11 +72,8 @@ def table(fleet: Fleet) -> str:
     """The table of coefficients, and the units to look at first, as aligned text."""
     lines = [HEAD, *rows(fleet)]
     kept = [i for i in range(len(HEAD)) if any(line[i] for line in lines[1:])]
-    widths = {i: max(len(line[i]) for line in lines) for i in kept}
-    text = [
-        "  ".join(line[i].rjust(widths[i]) if 0 < i < 9 else line[i].ljust(widths[i]) for i in kept).rstrip()
-        for line in (lines if fleet.spreads else ())
-    ]
+    words = {place for place, i in enumerate(kept) if not 0 < i < 9}
+    text = aligned([[line[i] for i in kept] for line in lines], words) if fleet.spreads else []
     named = [f"{fleet.rows[place].serial}  {words}" for place, words in fleet.first[:10]]
     more = len(fleet.first) - len(named)
     named += [f"and {more} more, in units.csv and fleet.html"] if more > 0 else []

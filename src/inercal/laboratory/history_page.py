@@ -11,8 +11,10 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
+from inercal.estimate.table import aligned
 from inercal.inputs import Source
 from inercal.instruments.terms import term
 from inercal.laboratory.chart import LIMIT, Mask
@@ -27,9 +29,10 @@ from inercal.report.style import ALARM, COLOURS, QUIET
 
 COMMAND = "history"
 
-MODEL = (
-    "x(t) = a + b t + w(t), w a random walk of variance q t; y_k = x(t_k) + c + v_k + e_k: c of u common to all "
-    "calibrations, v_k its rest, e_k of variance s^2; q and s^2 averaged over by their restricted likelihood"
+MODEL = Formula(
+    "$x(t) = a + b t + w(t)$, $w$ a random walk of variance $q t$; $y_k = x(t_k) + c + v_k + e_k$: $c$ of $u$ common "
+    "to all calibrations, $v_k$ its rest, $e_k$ of variance $s^2$; $q$ and $s^2$ averaged over by their restricted "
+    "likelihood"
 )
 
 
@@ -141,11 +144,8 @@ def table(history: History) -> str:
     """The table as aligned text."""
     lines = [(*HEAD[:6], f"on {history.at}", *HEAD[7:]), *rows(history)]
     kept = [i for i in range(len(HEAD)) if i < 9 or any(line[i] for line in lines[1:])]
-    widths = {i: max(len(line[i]) for line in lines) for i in kept}
-    return "\n".join(
-        "  ".join(line[i].rjust(widths[i]) if 0 < i < 8 else line[i].ljust(widths[i]) for i in kept).rstrip()
-        for line in lines
-    )
+    words = {place for place, i in enumerate(kept) if not 0 < i < 8}
+    return "\n".join(aligned([[line[i] for i in kept] for line in lines], words))
 
 
 def rows_csv(history: History) -> str:

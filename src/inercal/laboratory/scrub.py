@@ -44,8 +44,9 @@ _SMALL = 1 << 20
 
 @dataclass(frozen=True)
 class Scrubbed:
-    """Parts of a store that were written anew: subjects of events by kind, objects, texts in rows. ``files``: SHA-256 of
-    those that hold a secret and stay, for results rest on them. The head of the chain ``before`` and now."""
+    """Parts of a store that were written anew: subjects of events by kind, objects, texts in rows.
+
+    ``files``: SHA-256 of those that hold a secret and stay, for results rest on them. ``before``: the old head."""
 
     subjects: Mapping[str, tuple[str, ...]]
     objects: int

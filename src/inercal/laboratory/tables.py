@@ -11,7 +11,6 @@ from typing import Annotated
 from sqlalchemy import REAL, BigInteger, Double, ForeignKey, Integer, Text, UniqueConstraint
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-Number = Annotated[float, mapped_column(Double().with_variant(REAL(), "sqlite"))]
 MaybeNumber = Annotated[float | None, mapped_column(Double().with_variant(REAL(), "sqlite"))]
 Words = Annotated[str, mapped_column(Text)]
 MaybeWords = Annotated[str | None, mapped_column(Text)]

@@ -14,6 +14,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.noise import SYMBOLS
@@ -40,9 +41,10 @@ ENOUGH = 300
 ONE_SIDED = 1.6449
 """Standard uncertainties to the one-sided 95 % limit of a normal distribution."""
 
-MODEL = (
-    "sigma^2(tau) = R^2 tau^2/2 + K^2 tau/3 + B^2 (2 ln 2)/pi + N^2/tau + 3 Q^2/tau^2, sigma the overlapping Allan "
-    "deviation of means over tau: N at 1 s on the slope -1/2, K at 3 s on +1/2, B = floor/0.664"
+MODEL = Formula(
+    r"$\sigma^2(\tau) = R^2 \tau^2/2 + K^2 \tau/3 + B^2 (2 \ln\,2)/\pi + N^2/\tau + 3 Q^2/\tau^2$, $\sigma$ the "
+    r"overlapping Allan deviation of means over $\tau$: $N$ at 1 s on the slope -1/2, $K$ at 3 s on +1/2, $B$ = "
+    "floor/0.664"
 )
 
 REFERENCES = (

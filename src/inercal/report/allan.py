@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded
+from inercal.estimate.table import aligned
 from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.noise.outcome import ChannelNoise, Noise
@@ -90,13 +91,7 @@ def table(noise: Noise) -> str:
         heads.append(f"N of a sample [{shown_units(unit)[0][0]}]")
         rows = [["", *heads]]
         rows += [[channel.name, *cells(channel, noise), of_a_sample(channel)] for channel in channels]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-        parts.append(
-            "\n".join(
-                "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-                for row in rows
-            )
-        )
+        parts.append("\n".join(aligned(rows, range(len(rows[0])))))
     return "\n\n".join(parts)
 
 

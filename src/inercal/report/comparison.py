@@ -11,6 +11,7 @@ import numpy as np
 from inercal.estimate.result import Estimate
 from inercal.estimate.rounding import rounded
 from inercal.estimate.shown import temperature
+from inercal.estimate.table import aligned
 from inercal.findings import Status
 from inercal.instruments.terms import term
 from inercal.report.html import Picture
@@ -29,14 +30,7 @@ def table(estimate: Estimate) -> str:
     lines = [head] + [
         (row["name"], *_numbers(row), _mark(row), row["unit"]) for row in estimate.result["coefficients"]
     ]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if i in (0, 6, 7) else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    )
+    return "\n".join(aligned(lines, (0, 6, 7)))
 
 
 def _numbers(row: Mapping[str, Any]) -> tuple[str, ...]:

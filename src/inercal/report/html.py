@@ -16,7 +16,7 @@ from inercal.estimate.shown import in_words
 from inercal.estimate.table import Table
 from inercal.findings import Status
 from inercal.instruments.terms import term
-from inercal.report.mathml import clauses
+from inercal.report.formulas import clauses
 from inercal.report.style import plain_unit
 from inercal.units import parse_unit
 

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from inercal.estimate.result import Estimate
+from inercal.estimate.table import aligned
 from inercal.report.html import page as template
 
 _HEAD = ("", "case", "found", "expected", "", "unit", "source")
-_RIGHT = (2, 3)
+_WORDS = (0, 1, 4, 5, 6)
 
 
 def table(estimate: Estimate) -> str:
@@ -27,14 +28,7 @@ def table(estimate: Estimate) -> str:
         )
         for row in rows
     ]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(_HEAD))]
-    texts = [
-        " ".join(
-            cell.rjust(width) if i in _RIGHT else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ).rstrip()
-        for line in lines
-    ]
+    texts = aligned(lines, _WORDS, " ")
     reasons = ["", *(f"  {row['error']}" if row["error"] else "" for row in rows)]
     return "\n".join(text + reason for text, reason in zip(texts, reasons, strict=True))
 

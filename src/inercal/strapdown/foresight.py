@@ -1,4 +1,4 @@
-"""Turns of a strapdown unit before they are made: bounds with a better or worse unit, and the attitudes on the way."""
+"""Turns of a strapdown unit before they are made: bounds with a better or worse unit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.designs.foresight import Course, Foresight, Lever
+from inercal.designs.foresight import Foresight, Lever
 from inercal.errors import StudyError
 from inercal.geometry.rotations import elementary
 from inercal.strapdown.bounds import Pieces, bounds
@@ -23,9 +23,6 @@ _OF_NOISE = {
     "accelerometer_walk": ("m/s^2/sqrt(s)", 1.0),
 }
 """Sizes of the noise of a study with their units for people."""
-
-_MOMENTS = 12
-"""Moments of a turn."""
 
 
 def foresight(settings: StrapdownSettings) -> Foresight:
@@ -50,21 +47,13 @@ def foresight(settings: StrapdownSettings) -> Foresight:
     return Foresight(names, units, np.array(sizes), (*levers, stand), u)
 
 
-def course(settings: StrapdownSettings) -> Course:
-    """Attitudes along the plan of a study. Raises `StudyError` without turns."""
+def verticals(settings: StrapdownSettings) -> Array:
+    """Directions (r, 3) of the vertical on the unit in each rest. Raises `StudyError` without turns."""
     plan = _plan(settings)
-    C = start_attitude(plan)
-    poses, stops, words = [C], [0], ["first rest"]
-    for number, (axis, angle) in enumerate(plan.turns, start=1):
-        parts = np.linspace(0.0, angle, _MOMENTS + 1)[1:]
-        poses += list(C @ elementary(AXES[axis], parts))
-        turn = f"turn {number}: {AXES[axis]} {math.degrees(angle):+.4g} deg"
-        words += [turn] * (_MOMENTS - 1) + [f"{turn}, rest"]
-        stops.append(len(poses) - 1)
-        C = poses[-1]
-    return Course(
-        tuple(words), np.stack(poses)[:, None], np.zeros((1, 3)), np.array(stops), np.zeros((0, 2, 3))
-    )
+    attitudes = [start_attitude(plan)]
+    for axis, angle in plan.turns:
+        attitudes.append(attitudes[-1] @ elementary(AXES[axis], angle))
+    return np.stack(attitudes)[:, 2]
 
 
 def _plan(settings: StrapdownSettings) -> Plan:

@@ -12,6 +12,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
@@ -40,11 +41,11 @@ FRAMES = {
     "origin at accelerometer z",
 }
 
-MODEL = (
-    "y_a = K1 (M fs + K2 fs^2) + K0, fs_i = (f + W r_i)_i at the time t - tau_a, W = [w' x] + [w x][w x]; "
-    "y_g = S (T w + S_asym/2 |w|) + G f + D_F; f and w are specific force and inertial rate at the origin of b, M and "
-    "T have diagonals of 1, r_z = 0. At rest the velocity is zero, attitude and velocity are carried through all "
-    "samples."
+MODEL = Formula(
+    r"$y_a = K_1 (M f_s + K_2 f_s^2) + K_0$, $f_{s,i} = (f + W r_i)_i$ at the time $t - \tau_a$, "
+    r"$W = [w' \times] + [w \times][w \times]$; $y_g = S (T w + S_{\mathrm{asym}}/2 |w|) + G f + D_F$; $f$ and $w$ are "
+    "specific force and inertial rate at the origin of b, $M$ and $T$ have diagonals of 1, $r_z = 0$. At rest the "
+    "velocity is zero, attitude and velocity are carried through all samples."
 )
 
 REFERENCES = (

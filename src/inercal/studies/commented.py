@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
+
+from inercal.studies.text import toml
 
 Schema = Mapping[str, Any]
 
@@ -125,15 +126,6 @@ def example(field: Schema, definitions: Mapping[str, Schema]) -> Any:
         case {"properties": keys}:
             return {key: example(keys[key], definitions) for key in schema.get("required", ())}
     return schema.get("minimum", 1)
-
-
-def toml(value: object) -> str:
-    """A value as TOML, on one line."""
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {toml(each)}' for key, each in value.items())} }}" if value else "{}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(toml, value))}]"
-    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def _resolved(field: Schema, definitions: Mapping[str, Schema]) -> Schema:

@@ -11,10 +11,11 @@ from typing import Any, Literal
 
 from inercal.instruments.by_angle import CHANNELS
 from inercal.rigs.tables import slots
-from inercal.studies.commented import commented, line
+from inercal.studies.commented import commented
 from inercal.studies.load import put, reader, unfilled
 from inercal.studies.schema import json_schema
 from inercal.studies.starting import STARTING
+from inercal.studies.text import toml, with_keys
 from inercal.studies.tolerances import SYMBOLS
 from inercal.units import Unit
 
@@ -215,19 +216,11 @@ def _hidden() -> str:
 
 def _with_instrument(body: str, lines: str, given: Mapping[str, Any]) -> str:
     """The study with examples for the kind of its instrument, and its given keys."""
-    values = {**given, **given.get("coefficients", {})}
-    values.pop("coefficients", None)
-    for key, value in values.items():
-        place = re.search(rf"(?m)^(?:# )?{re.escape(key)} = .*?(?: +# (.*))?$", lines)
-        if place is not None:
-            text = "\n".join(line(key, value, place[1] or "", True))
-            lines = lines[: place.start()] + text + lines[place.end() :]
-            continue
-        inner = ".coefficients" if key in given.get("coefficients", {}) else ""
-        heading = re.search(rf"(?m)^\[instrument{inner}\].*\n", lines)
-        assert heading is not None
-        text = "\n".join(line(key, value, "", True))
-        lines = f"{lines[: heading.end()]}{text}\n{lines[heading.end() :]}"
+    for key, value in given.items():
+        inner = (
+            {f"{key}.{name}": each for name, each in value.items()} if key == "coefficients" else {key: value}
+        )
+        lines = with_keys(lines, {f"instrument.{name}": toml(each) for name, each in inner.items()})
     start = re.search(r"(?m)^(# )?\[instrument\]", body)
     end = re.search(r"(?m)^(# )?\[design\]", body)
     assert start is not None

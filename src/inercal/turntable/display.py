@@ -11,6 +11,7 @@ import numpy as np
 
 from inercal.estimate.result import Estimate
 from inercal.estimate.shown import in_words
+from inercal.estimate.table import aligned
 from inercal.instruments.terms import shown_unit
 from inercal.units import STANDARD_GRAVITY, Unit
 
@@ -122,11 +123,4 @@ def tolerances(estimate: Estimate) -> str:
     if not rows:
         return ""
     head = ("", "largest error of the table", "of its part", "u x, if halved")
-    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(4)]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if i < 2 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in (head, *rows)
-    )
+    return "\n".join(aligned([head, *rows], (0, 1)))

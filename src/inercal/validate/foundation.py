@@ -15,16 +15,16 @@ _PI = 3.14159265358979324
 _DEG_PER_H = 648000.0 / _PI
 """One rad/s."""
 
-_NORRIS = """
+NORRIS = """
 0.1 0.2  338.8 337.4  118.1 118.2  888.0 884.6  9.2 10.1  228.1 226.5  668.5 666.3  998.5 996.3  449.1 448.6
 778.9 777.0  559.2 558.2  0.3 0.4  0.1 0.6  778.1 775.5  668.8 666.9  339.3 338.0  448.9 447.5  10.8 11.6
 557.7 556.0  228.3 228.1  998.0 995.8  888.8 887.6  119.6 120.2  0.3 0.3  0.6 0.3  557.6 556.8  339.3 339.1
 888.0 887.2  998.5 999.0  778.9 779.0  10.2 11.1  117.6 118.3  228.9 229.2  668.4 669.1  449.2 448.9  0.2 0.5
 """
-_NORRIS_CERTIFIED = np.array(
+NORRIS_CERTIFIED = np.array(
     [-0.262323073774029, 1.00211681802045, 0.232818234301152, 0.429796848199937e-3, 0.884796396144373]
 )
-_LONGLEY = """
+LONGLEY = """
 60323 83.0 234289 2356 1590 107608 1947   61122 88.5 259426 2325 1456 108632 1948
 60171 88.2 258054 3682 1616 109773 1949   61187 89.5 284599 3351 1650 110929 1950
 63221 96.2 328975 2099 3099 112075 1951   63639 98.1 346999 1932 3594 113270 1952
@@ -34,17 +34,17 @@ _LONGLEY = """
 68655 112.6 482704 3813 2552 123366 1959  69564 114.2 502601 3931 2514 125368 1960
 69331 115.7 518173 4806 2572 127852 1961  70551 116.9 554894 4007 2827 130081 1962
 """
-_LONGLEY_CERTIFIED = np.array(
+LONGLEY_CERTIFIED = np.array(
     [-3482258.63459582, 15.0618722713733, -0.358191792925910e-1, -2.02022980381683, -1.03322686717359,
      -0.511041056535807e-1, 1829.15146461355, 890420.383607373, 84.9149257747669, 0.334910077722432e-1,
      0.488399681651699, 0.214274163161675, 0.226073200069370, 455.478499142212, 304.854073561965]
 )  # fmt: skip
-_MISRA1A = np.array(
+MISRA1A = np.array(
     [(10.07, 77.6), (14.73, 114.9), (17.94, 141.1), (23.93, 190.8), (29.61, 239.9), (35.18, 289.0),
      (40.02, 332.8), (44.82, 378.4), (50.76, 434.8), (55.05, 477.3), (61.01, 536.8), (66.40, 593.1),
      (75.47, 689.1), (81.78, 760.0)]
 )  # fmt: skip
-_MISRA1A_CERTIFIED = np.array([2.3894212918e02, 5.5015643181e-04])
+MISRA1A_CERTIFIED = np.array([2.3894212918e02, 5.5015643181e-04])
 
 _DIGITS = 1e-9
 """Relative limit for certified values of 15 digits: what rounding of doubles costs with their condition numbers."""
@@ -112,7 +112,7 @@ def _wampler() -> Array:
 
 def _misra() -> Array:
     """Both coefficients from the first official start: errors relative to the certified values."""
-    y, x = _MISRA1A.T
+    y, x = MISRA1A.T
     start = np.array([500.0, 1e-4])
     fit = solve(
         lambda b: b[0] * (1 - np.exp(-b[1] * x)) - y,
@@ -121,7 +121,7 @@ def _misra() -> Array:
         ("b1", "b2"),
         start,
     )
-    return np.asarray(fit.x / _MISRA1A_CERTIFIED - 1.0)
+    return np.asarray(fit.x / MISRA1A_CERTIFIED - 1.0)
 
 
 CASES = (
@@ -182,7 +182,7 @@ CASES = (
         "NIST StRD",
         np.zeros(5),
         _DIGITS,
-        lambda: _regression(_NORRIS, _NORRIS_CERTIFIED),
+        lambda: _regression(NORRIS, NORRIS_CERTIFIED),
     ),
     Case(
         "nist-longley",
@@ -190,7 +190,7 @@ CASES = (
         "NIST StRD",
         np.zeros(15),
         _DIGITS,
-        lambda: _regression(_LONGLEY, _LONGLEY_CERTIFIED),
+        lambda: _regression(LONGLEY, LONGLEY_CERTIFIED),
     ),
     Case(
         "nist-wampler1",

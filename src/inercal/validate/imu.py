@@ -58,10 +58,10 @@ def _vector(estimate: Estimate, name: str) -> Array:
 
 # The recording of Tedaldi et al. 2014, in counts, and what imu_tk makes of it: scale 1/K, T, bias, gyro scale.
 
-_TK_SCALE = np.array([414.4588739254017, 412.01046845347594, 414.6486622431341])
-_TK_T = (-0.00335929903323467, -0.00890639474323122, -0.0213341193851847)
-_TK_BIAS = np.array([33124.1825645617, 33275.1794341807, 32364.4156494431])
-_TK_GYRO = np.array([4777.955828030662, 4764.206560263323, 4773.65741055623])
+TK_SCALE = np.array([414.4588739254017, 412.01046845347594, 414.6486622431341])
+TK_T = (-0.00335929903323467, -0.00890639474323122, -0.0213341193851847)
+TK_BIAS = np.array([33124.1825645617, 33275.1794341807, 32364.4156494431])
+TK_GYRO = np.array([4777.955828030662, 4764.206560263323, 4773.65741055623])
 
 
 def _tedaldi_misalignments() -> Array:
@@ -72,7 +72,7 @@ def _tedaldi_misalignments() -> Array:
 
 # imucal 2.6.0: w_cal = R_g^-1 K_g^-1 (w - K_ga a_cal - b_g), a_cal = R_a^-1 K_a^-1 (a - b_a), m/s^2 and deg/s.
 
-_IMUCAL = {
+IMUCAL = {
     "ferraris": {
         "K_a": [208.54567263762615, 208.0011341167055, 214.78455364603022],
         "R_a": [
@@ -120,7 +120,7 @@ _IMUCAL = {
 
 def _imucal(name: str) -> list[Array]:
     """K_a R_a, b_a, K_g R_g, b_g, K_ga as published."""
-    given = {key: np.array(value) for key, value in _IMUCAL[name].items()}
+    given = {key: np.array(value) for key, value in IMUCAL[name].items()}
     triads = [np.diag(given[f"K_{s}"]) @ given[f"R_{s}"] for s in "ag"]
     return [triads[0], given["b_a"], triads[1], given["b_g"], given["K_ga"]]
 
@@ -141,25 +141,25 @@ def _ferraris(name: str) -> Array:
 
 # The turntable of pyins, S M of the truth and its own largest errors.
 
-_TABLE_ACC = [
+TABLE_ACC = [
     [1.00761037725147, 0.001216750164928284, 0.004438632327454257],
     [0.0033367432737426684, 1.0149407907315762, -0.0020515826376580086],
     [0.003130677016509014, -0.008540957393017247, 0.9744701018416592],
 ]
-_TABLE_GYRO = [
+TABLE_GYRO = [
     [1.0176405234596766, 0.004001572083672233, 0.009787379841057393],
     [0.022408931992014578, 1.0186755799014997, -0.00977277879876411],
     [0.009500884175255894, -0.001513572082976979, 0.9989678114820644],
 ]
-_TABLE_ACC_BIAS = (0.13041039201706542, 0.17227293074811315, -0.1481500012389673)
+TABLE_ACC_BIAS = (0.13041039201706542, 0.17227293074811315, -0.1481500012389673)
 
 
 def _table_errors() -> Array:
     """Errors of 12 coefficients of the accelerometers over their standard uncertainties."""
-    estimate, true = _calibrated("table"), np.array(_TABLE_ACC)
+    estimate, true = _calibrated("table"), np.array(TABLE_ACC)
     names = [f"K1_{i}" for i in _AXES] + [f"M_{i}{j}" for i in _AXES for j in _AXES if i != j]
     values = [*np.diag(true), *(true[i, j] / true[i, i] for i in range(3) for j in range(3) if i != j)]
-    names, values = [*names, *(f"K0_{i}" for i in _AXES)], [*values, *_TABLE_ACC_BIAS]
+    names, values = [*names, *(f"K0_{i}" for i in _AXES)], [*values, *TABLE_ACC_BIAS]
     return np.array(
         [(estimate[name].value - value) / estimate[name].u for name, value in zip(names, values, strict=True)]
     )
@@ -167,7 +167,7 @@ def _table_errors() -> Array:
 
 # The climatic chamber: cubics of six channels, from the third power down.
 
-_SWEEP = {
+SWEEP = {
     "gyro_x": (-6.547811871319369e-08, 1.127144684294249e-05, -0.0002905713924390807, -0.06908658751315856),
     "gyro_y": (-6.692696824869698e-08, 1.2259127488900832e-05, 0.00016234193328487474, -0.014969894544332965),
     "gyro_z": (1.743340035571664e-08, 2.0666313069123659e-07, -4.339730106444391e-05, 0.01634952711564554),
@@ -181,7 +181,7 @@ _HOT = 74.0 ** np.arange(3, -1, -1)
 def _sweep() -> Array:
     """Contribution of each power at 74 degC."""
     cubics = {curve.name: curve.cubic for curve in fit_recording(record_of("thermal"), 0.0).curves}
-    return np.stack([cubics[name].coefficients[::-1] * _HOT for name in _SWEEP])
+    return np.stack([cubics[name].coefficients[::-1] * _HOT for name in SWEEP])
 
 
 # A simulated session without noise, and its calibration in the files of other tools.
@@ -241,13 +241,13 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         1.5e-4,
-        lambda: _vector(_as_published(), "K1") / _TK_SCALE - 1.0,
+        lambda: _vector(_as_published(), "K1") / TK_SCALE - 1.0,
     ),
     Case(
         "tedaldi-misalignment",
         "Accelerometers turned by hand through 38 poses: misalignments",
         "imu_tk",
-        _TK_T,
+        TK_T,
         [1.1e-4, 4.7e-4, 1.1e-4],
         _tedaldi_misalignments,
         "rad",
@@ -258,7 +258,7 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         2e-3,
-        lambda: (_vector(_as_published(), "K0") - _TK_BIAS) / _TK_SCALE,
+        lambda: (_vector(_as_published(), "K0") - TK_BIAS) / TK_SCALE,
         "m/s^2",
     ),
     Case(
@@ -267,7 +267,7 @@ CASES = (
         "imu_tk",
         np.zeros(3),
         1.5e-3,
-        lambda: _vector(_as_published(), "S") / _TK_GYRO - 1.0,
+        lambda: _vector(_as_published(), "S") / TK_GYRO - 1.0,
     ),
     *(
         Case(
@@ -278,13 +278,13 @@ CASES = (
             1e-11,
             lambda name=name: _ferraris(name),  # type: ignore[misc]
         )
-        for name in _IMUCAL
+        for name in IMUCAL
     ),
     Case(
         "table-accelerometer",
         "Two-axis table: scale factors and misalignments of the accelerometers against the truth",
         "pyins",
-        _TABLE_ACC,
+        TABLE_ACC,
         8.6109e-5,
         lambda: _matrix(_calibrated("table"), "K1", "M"),
     ),
@@ -292,7 +292,7 @@ CASES = (
         "table-gyro",
         "Two-axis table: scale factors and misalignments of the gyro against the truth",
         "pyins",
-        _TABLE_GYRO,
+        TABLE_GYRO,
         4.4216e-4,
         lambda: _matrix(_calibrated("table"), "S", "T"),
     ),
@@ -309,7 +309,7 @@ CASES = (
         "thermal-cubics",
         "Output over temperature: each power of six cubics, at 74 degC",
         "TofuPilot",
-        np.array(list(_SWEEP.values())) * _HOT,
+        np.array(list(SWEEP.values())) * _HOT,
         1e-9,
         _sweep,
     ),

@@ -15,8 +15,8 @@ from inercal.validate.case import Case, record_of
 _STABLE32 = (2.9223e-1, 2.0102e-1, 1.4479e-1, 1.0570e-1, 6.1915e-2, 4.8082e-2, 3.6237e-2, 2.7674e-2)
 """Overlapping deviations at 1, 2, 4, .. 128 samples."""
 
-_TAU = (0.01, 0.2, 1.0, 10.0, 100.0, 500.0)
-_ALLANTOOLS = np.array([
+TAU = (0.01, 0.2, 1.0, 10.0, 100.0, 500.0)
+ALLANTOOLS = np.array([
     (53.11216154222367, 55.28366668891407, 17.352969950226534, 8.420291462833005, 2.0748463944562054,
      0.3194956678121396),
     (56.81165185739366, 128.1875331885039, 60.656479319263276, 14.691978514290197, 2.66111878764186,
@@ -30,7 +30,7 @@ _ALLANTOOLS = np.array([
     (0.15447873140045076, 0.015491746861201043, 0.0021488211484324503, 0.0002479537594927087,
      8.300677745884409e-05, 0.00015205098080045296),
 ])  # fmt: skip
-"""At `_TAU` [s]: gyros x, y, z [deg/h], accelerometers x, y, z [m/s^2]."""
+"""At `TAU` [s]: gyros x, y, z [deg/h], accelerometers x, y, z [m/s^2]."""
 
 _TRUE = NoiseModel(N=3e-4, B=0.0, K=2e-4)
 _SEED = 20230517
@@ -55,7 +55,7 @@ def _recording() -> Array:
     record = record_of("lasergyro")
     deg_per_h = parse_unit("deg/h").factor
     x = np.hstack([record.triad("gyro").values / deg_per_h, record.triad("acc").values])
-    return np.asarray(allan_deviation(x, 0.01, _TAU).deviation.T / _ALLANTOOLS - 1.0)
+    return np.asarray(allan_deviation(x, 0.01, TAU).deviation.T / ALLANTOOLS - 1.0)
 
 
 def _coefficients() -> list[float]:

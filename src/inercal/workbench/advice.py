@@ -8,7 +8,8 @@ from typing import Any
 
 from inercal.errors import InputError
 from inercal.findings import Finding
-from inercal.workbench.form import changed, parsed, problem
+from inercal.studies.text import changed, parsed
+from inercal.workbench.form import problem
 
 _SET = re.compile(r"\bset ([a-z_]\w*(?:\.\w+)+) = (true|false|\"[^\"]*\"|[-+.\de]+\d)")
 _UNDER = re.compile(

@@ -22,7 +22,7 @@ from inercal.workbench.measurements import MEASURED, Measurements
 from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions, put
 
 if TYPE_CHECKING:
-    from inercal.designs.foresight import Course as Planned
+    from inercal.arrays import Array
     from inercal.designs.foresight import Foresight
     from inercal.face.result import Result
     from inercal.face.study import Study
@@ -144,9 +144,12 @@ class Bench:
                 shutil.copyfile(path, made.folder / path.name)
         return self.begin_study(made, kind)
 
-    def foreseen(self, session: Session) -> tuple[Study, Foresight, Planned]:
-        """The study of a session, what its plan makes expect, and its course; raises `InputError`."""
-        from inercal.face.foresight import course, foresight
+    def foreseen(self, session: Session) -> tuple[Study, Foresight, Array]:
+        """The study of a session, what its plan makes expect, and the vertical (r, 3) on the instrument at each stop.
+
+        Raises `InputError`.
+        """
+        from inercal.face.foresight import foresight, verticals
         from inercal.face.study import read_study
 
         if session.study is None:
@@ -154,7 +157,7 @@ class Bench:
         study = read_study(session.kind, session.study)
         seen = foresight(study)
         seen.u(np.ones(len(seen.levers)))  # loads what it is computed with
-        return study, seen, course(study)
+        return study, seen, verticals(study)
 
     def design(self, session: Session, settings: Sequence[str] = ()) -> Job:
         """Put the search for a better plan into the queue, with ``settings`` as of ``--set``; raises `InputError`."""
@@ -179,7 +182,7 @@ class Bench:
 
     def change(self, session: Session, path: str, value: str) -> None:
         """Set a key of the study of a session; raises `InputError` where that cannot be."""
-        from inercal.workbench.form import changed
+        from inercal.studies.text import changed
 
         if session.study is None:
             raise InputError(session.title, "found no study, expected one")

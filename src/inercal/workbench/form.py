@@ -1,16 +1,15 @@
-"""A study as a form: its keys with what they mean, and a key of the text changed where it stands."""
+"""A study as a form: its keys with what they mean, and what is typed as TOML."""
 
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from inercal.errors import InercalError, InputError
+from inercal.errors import InercalError
+from inercal.studies.text import parsed, toml
 
 Widget = Literal["choice", "switch", "text", "value"]
 """Kinds of typing a key: chosen, switched, a text, or any value of TOML."""
@@ -63,14 +62,6 @@ def tables(kind: str, text: str) -> tuple[Table, ...]:
     return (*given, *(each for each in found if each not in given))
 
 
-def parsed(text: str) -> dict[str, Any]:
-    """The keys of a TOML text; raises `InputError` with the line."""
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError("study", f"found no TOML: {error}") from error
-
-
 def problem(kind: str, text: str) -> str:
     """The fault of a study in one sentence; empty without one."""
     from inercal.studies.load import reader
@@ -80,23 +71,6 @@ def problem(kind: str, text: str) -> str:
     except InercalError as error:
         return str(error)
     return ""
-
-
-def changed(text: str, path: str, value: str) -> str:
-    """The text with a key set to ``value``, in TOML; commented out where that is empty. All else stays as it is.
-
-    Raises `InputError` where the value is no TOML, or the key cannot be changed in place.
-    """
-    wanted = _with(parsed(text), path.split("."), parsed(f"value = {value}")["value"] if value else None)
-    lines = text.splitlines()
-    for edited in _edits(lines, path, value, wanted):
-        made = "\n".join(edited) + "\n"
-        try:
-            if _filled(tomllib.loads(made)) == _filled(wanted):
-                return made
-        except tomllib.TOMLDecodeError:
-            continue
-    raise InputError(path, "cannot be changed here, expected a change in the text of the study")
 
 
 def as_toml(typed: str, widget: Widget) -> str:
@@ -158,9 +132,9 @@ def _key(
     elif any(each.get("type") == "string" for each in options):
         widget = "text" if isinstance(table.get(name, ""), str) else "value"
     value = table.get(name)
-    shown = "" if value is None else value if widget in ("text", "choice") else _toml(value)
+    shown = "" if value is None else value if widget in ("text", "choice") else toml(value)
     examples = key.get("examples") or [""]
-    example = examples[0] if isinstance(examples[0], str) else _toml(examples[0])
+    example = examples[0] if isinstance(examples[0], str) else toml(examples[0])
     return Key(path, name, str(key.get("description", "")), widget, choices, example, str(shown))
 
 
@@ -170,126 +144,3 @@ def _at(data: Mapping[str, Any], path: str) -> Mapping[str, Any]:
         inner = data.get(name)
         data = inner if isinstance(inner, Mapping) else {}
     return data
-
-
-def _with(data: Mapping[str, Any], path: list[str], value: Any) -> dict[str, Any]:
-    """Keys with one set, or taken out for None."""
-    copy = dict(data)
-    if len(path) > 1:
-        copy[path[0]] = _with(copy.get(path[0], {}), path[1:], value)
-    elif value is None:
-        copy.pop(path[0], None)
-    else:
-        copy[path[0]] = value
-    return copy
-
-
-def _filled(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys without the tables that hold nothing."""
-    whole = {key: _filled(each) if isinstance(each, Mapping) else each for key, each in data.items()}
-    return {key: each for key, each in whole.items() if each != {}}
-
-
-def _edits(lines: list[str], path: str, value: str, wanted: Mapping[str, Any]) -> Iterator[list[str]]:
-    """Ways to change a key: in place, in the table within a line that it stands in, or at the end of its table."""
-    names = path.split(".")
-    for depth in range(len(names) - 1, -1, -1):
-        table, name = ".".join(names[:depth]), names[depth]
-        inner = _at(wanted, ".".join(names[: depth + 1]))
-        new = value if depth == len(names) - 1 else _toml(inner) if inner else ""
-        if (edited := _in_place(lines, table, name, new)) is not None:
-            yield edited
-    if value:
-        yield _at_end(lines, ".".join(names[:-1]), names[-1], value)
-    elif (span := _span(lines, path)) is not None:  # a whole table, with its head
-        begin, end = span[0] - 1, span[1]
-        gone = [
-            f"# {line}" if line.strip() and not line.startswith("#") else line for line in lines[begin:end]
-        ]
-        yield [*lines[:begin], *gone, *lines[end:]]
-
-
-def _in_place(lines: list[str], table: str, name: str, value: str) -> list[str] | None:
-    """The lines with the key changed where it stands, or where it is commented out."""
-    span = _span(lines, table)
-    if span is None:
-        return None
-    own = re.compile(rf"(\s*)(#\s*)?{re.escape(name)}\s*=(.*)")
-    found = [(k, match) for k in range(*span) if (match := own.fullmatch(lines[k]))]
-    found.sort(key=lambda each: bool(each[1][2]))  # a key in force before its example
-    if not found:
-        return None
-    k, match = found[0]
-    end = k + 1 if match[2] else _end(lines, k, match[3])
-    if not value:
-        return [*lines[:k], *(f"# {line}" for line in lines[k:end]), *lines[end:]]
-    head = f"{name} = {value}"
-    remark = "" if "\n" in value else _remark(match[3])
-    return [*_in_force(lines[:k], table), f"{head:35s} {remark}".rstrip(), *lines[end:]]
-
-
-def _end(lines: list[str], k: int, begun: str) -> int:
-    """The line after the value that begins on line ``k``: a list may go over several."""
-    whole = begun
-    for end in range(k + 1, len(lines) + 1):
-        if end == k + 1 or "]" in lines[end - 1]:
-            with suppress(tomllib.TOMLDecodeError):
-                tomllib.loads(f"value = {whole}")
-                return end
-        whole += "\n" + lines[min(end, len(lines) - 1)]
-    return k + 1
-
-
-def _at_end(lines: list[str], table: str, name: str, value: str) -> list[str]:
-    """The lines with the key at the end of its table, which is made where it is not there."""
-    span = _span(lines, table)
-    if span is None:
-        return [*lines, "", f"[{table}]", f"{name} = {value}"]
-    end = span[1]
-    while end > span[0] and (not lines[end - 1].strip() or lines[end - 1].startswith("#")):
-        end -= 1
-    return [*_in_force(lines[:end], table), f"{name} = {value}", *lines[end:]]
-
-
-def _in_force(lines: list[str], table: str) -> list[str]:
-    """The lines with the head of a table no longer commented out."""
-    head = re.compile(rf"#\s*(\[{re.escape(table)}\].*)")
-    return [match[1] if (match := head.fullmatch(line)) else line for line in lines]
-
-
-def _span(lines: list[str], table: str) -> tuple[int, int] | None:
-    """First and last line of a table, its head left out; one that is commented out counts too."""
-    heads = [k for k, line in enumerate(lines) if re.match(r"(#\s*)?\[[\w.\"-]+\]\s*(#.*)?$", line)]
-    if not table:
-        return 0, heads[0] if heads else len(lines)
-    own = re.compile(rf"(#\s*)?\[{re.escape(table)}\]")
-    for k, following in zip(heads, [*heads[1:], len(lines)], strict=True):
-        if own.match(lines[k]):
-            return k + 1, following
-    return None
-
-
-def _remark(rest: str) -> str:
-    """The comment behind a value: from the first # before which the value is whole."""
-    for match in re.finditer("#", rest):
-        try:
-            tomllib.loads(f"value = {rest[: match.start()]}")
-        except tomllib.TOMLDecodeError:
-            continue
-        return rest[match.start() :]
-    return ""
-
-
-def _toml(value: Any) -> str:
-    """A parsed value as TOML again."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case Mapping():
-            return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
-        case list():
-            return "[" + ", ".join(map(_toml, value)) + "]"
-        case str():
-            return json.dumps(value, ensure_ascii=False)
-        case _:
-            return str(value)

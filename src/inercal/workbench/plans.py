@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
@@ -11,7 +10,7 @@ from typing import Any
 
 from inercal.errors import InputError
 from inercal.face.study import Study
-from inercal.workbench.form import changed, parsed
+from inercal.studies.text import parsed, toml, with_keys
 
 
 @dataclass(frozen=True)
@@ -40,17 +39,7 @@ def with_lines(kind: str, text: str, lines: str) -> str:
         return _with_sensors(text, rows)
     table = [[_with_unit(word) for word in row] for row in rows]
     key, others = _WHERE[kind]
-    value = "[\n" + "".join(f"    {json.dumps(row, ensure_ascii=False)},\n" for row in table) + "]"
-    return with_keys(text, {**dict.fromkeys(others, ""), key: value})
-
-
-def with_keys(text: str, keys: Mapping[str, str]) -> str:
-    """The text of a study with keys set to their TOML, or taken out where that is empty."""
-    given = parsed(text)
-    for path, value in keys.items():
-        if value or _has(given, path):
-            text = changed(text, path, value)
-    return text
+    return with_keys(text, {**dict.fromkeys(others, ""), key: _lines(table)})
 
 
 def with_found(kind: str, text: str, found: str) -> str:
@@ -59,23 +48,16 @@ def with_found(kind: str, text: str, found: str) -> str:
         return with_lines(kind, text, "\n".join(found.splitlines()[1:]))
     tables = tomllib.loads(found)
     others = dict.fromkeys(_WHERE[kind][1], "")
-    return with_keys(text, others | {f"plan.{key}": _toml(value) for key, value in tables["plan"].items()})
+    keys = {
+        f"plan.{key}": _lines(value) if key == "turns" else toml(value)
+        for key, value in tables["plan"].items()
+    }
+    return with_keys(text, others | keys)
 
 
-def _has(data: Mapping[str, Any], path: str) -> bool:
-    """True for a key that a study gives."""
-    for name in path.split("."):
-        if not isinstance(data, Mapping) or name not in data:
-            return False
-        data = data[name]
-    return True
-
-
-def _toml(value: Any) -> str:
-    """A parsed value as TOML, turns a line each."""
-    if isinstance(value, list) and value and isinstance(value[0], list):
-        return "[\n" + "".join(f"    {json.dumps(each)},\n" for each in value) + "]"
-    return json.dumps(value)
+def _lines(rows: list[list[str]]) -> str:
+    """Rows as TOML, a line each."""
+    return "[\n" + "".join(f"    {toml(row)},\n" for row in rows) + "]"
 
 
 def _with_unit(word: str) -> str:
@@ -98,7 +80,7 @@ def _with_sensors(text: str, rows: list[list[str]]) -> str:
     text = with_keys(text, {f"sensors.{name}": "" for name in gone})
     of_each = {f"sensors.{name}": {"axis": axis, "r": place} for name, axis, place in rows}
     return with_keys(
-        text, {f"{at}.{key}": json.dumps(word) for at, keys in of_each.items() for key, word in keys.items()}
+        text, {f"{at}.{key}": toml(word) for at, keys in of_each.items() for key, word in keys.items()}
     )
 
 
@@ -142,13 +124,13 @@ def _named() -> Mapping[str, Mapping[str, Mapping[str, str]]]:
     quarters = [["xyz"[axis], f"{math.degrees(angle):.10g} deg"] for axis, angle in NINETEEN]
     others = dict.fromkeys(("positions.grid", "positions.list", "positions.file"), "")
     return {
-        "turntable": {name: others | {"positions.plan": json.dumps(name)} for name in NAMED},
+        "turntable": {name: others | {"positions.plan": toml(name)} for name in NAMED},
         "selfcal": {
-            name: {"plan.turns": "", "plan.path": json.dumps(name)}
+            name: {"plan.turns": "", "plan.path": toml(name)}
             for name in ("paper", "paper two turns", "best", "plain")
         },
         "strapdown": {
-            "19 positions": {"plan.start": '["0 deg", "-90 deg", "0 deg"]', "plan.turns": _toml(quarters)}
+            "19 positions": {"plan.start": '["0 deg", "-90 deg", "0 deg"]', "plan.turns": _lines(quarters)}
         },
         "aoa": {},
     }

@@ -24,6 +24,7 @@ from inercal.aoa.settings import GYROS, AoaSettings
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import Uncertainty
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.geometry.rotations import principal
@@ -43,17 +44,21 @@ FLAT = (
     "1 deg of yaw at 8 Hz then costs 0.14 to 0.75 deg of theta, by whatever method"
 )
 
-MODEL = (
-    "A_i = f_x cos lambda_i - f_z sin lambda_i + b_i, f_x = g sin theta - (r_i + dr_i) w^2 - c (z_i + zo_i) al + s_x', "
-    "f_z = c (g cos theta + (r_i + dr_i) al) - c^2 (z_i + zo_i) w^2 + s_z', G = c (1 + k_g) w(t - tau_g) + b_g; w = "
-    "theta', al = w', c the cosine of the roll, s_x', s_z' flexure of the sting"
+MODEL = Formula(
+    r"$A_i = f_x \cos\,\lambda_i - f_z \sin\,\lambda_i + b_i$, "
+    r"$f_x = g \sin\,\theta - (r_i + \mathrm{dr}_i) w^2 - c (z_i + \mathrm{zo}_i) w' + s_x'$, "
+    r"$f_z = c (g \cos\,\theta + (r_i + \mathrm{dr}_i) w') - c^2 (z_i + \mathrm{zo}_i) w^2 + s_z'$, "
+    r"$G = c (1 + k_g) w(t - \tau_g) + b_g$; $w = \theta'$, $c$ the cosine of the roll, $s_x'$, $s_z'$ "
+    "flexure of the sting"
 )
 
-SPATIAL = (
-    "A_i = f_x cos lambda_i - f_z sin lambda_i + b_i, f_x = g sin theta - (r_i + dr_i) (w^2 + y^2) - (z_i + zo_i) "
-    "(al - p y) + s_x', f_z = g cos theta cos phi + (r_i + dr_i) (al + p y) - (z_i + zo_i) (w^2 + p^2) + s_z', G = "
-    "(1 + k_g) w(t - tau_g) + b_g; theta' = w cos phi + y sin phi, phi' = p + (w sin phi - y cos phi) tan theta; p, y "
-    "rates of roll and yaw less b_roll, b_yaw"
+SPATIAL = Formula(
+    r"$A_i = f_x \cos\,\lambda_i - f_z \sin\,\lambda_i + b_i$, "
+    r"$f_x = g \sin\,\theta - (r_i + \mathrm{dr}_i) (w^2 + y^2) - (z_i + \mathrm{zo}_i) (w' - p y) + s_x'$, "
+    r"$f_z = g \cos\,\theta \cos\,\phi + (r_i + \mathrm{dr}_i) (w' + p y) - (z_i + \mathrm{zo}_i) (w^2 + p^2) "
+    r"+ s_z'$, $G = (1 + k_g) w(t - \tau_g) + b_g$; $\theta' = w \cos\,\phi + y \sin\,\phi$, "
+    r"$\phi' = p + (w \sin\,\phi - y \cos\,\phi) \tan\,\theta$; $p$, $y$ rates of roll and yaw less "
+    r"$b_{\mathrm{roll}}$, $b_{\mathrm{yaw}}$"
 )
 
 REFERENCES = (

@@ -10,6 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
 from inercal.imu.aided.coefficients import (
@@ -29,10 +30,11 @@ from inercal.imu.settings import COMMAND, MASKED, AidedSettings, ImuSettings
 from inercal.instruments.terms import TERMS
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along frame "
-    "axis j), all of M; accelerometers: K1, M, K0, and + K1 K2 (M x)^2 where K2 is estimated; gyro: S, T, D_F, and + "
-    "G f where g-sensitivity is estimated. The biases take random walks; K0 and D_F are their means over the test."
+MODEL = Formula(
+    r"$y = S M x + b$, $S = \mathrm{diag}$(scale factor), $M = 1$ + misalignment ($M_{ij}$: response of sensor $i$ to "
+    "the input along frame axis $j$), all of $M$; accelerometers: $K_1$, $M$, $K_0$, and $+ K_1 K_2 (M x)^2$ where "
+    "$K_2$ is estimated; gyro: $S$, $T$, $D_F$, and $+ G f$ where g-sensitivity is estimated. The biases take random "
+    "walks; $K_0$ and $D_F$ are their means over the test."
 )
 
 FRAME = "b, nominal axes of the instrument on the inner axis of the table"

@@ -11,6 +11,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
 from inercal.imu.ferraris.method import NAMES, coefficients
@@ -33,11 +34,11 @@ from inercal.instruments.terms import TERMS
 from inercal.records.column import Triad
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S M f + b, S = diag(K1), M = 1 + misalignment (full; M_ij: response of accelerometer i to specific force "
-    "along j), b = K0; gyro: y = S T omega + D_F + G f (T_ij: response of gyro i to rate about j). Frame: its axis x "
-    "the mean of the upward direction in x_p and the downward one in x_a, y and z likewise; turns positive about the "
-    "positive axis by the right-hand rule."
+MODEL = Formula(
+    r"$y = S M f + b$, $S = \mathrm{diag}(K_1)$, $M = 1$ + misalignment (full; $M_{ij}$: response of accelerometer $i$ "
+    r"to specific force along $j$), $b = K_0$; gyro: $y = S T \omega + D_F + G f$ ($T_{ij}$: response of gyro $i$ to "
+    "rate about $j$). Frame: its axis x the mean of the upward direction in $x_p$ and the downward one in $x_a$, y and "
+    "z likewise; turns positive about the positive axis by the right-hand rule."
 )
 
 FRAME = "b, of the instrument: its axes the upward directions in the six positions, opposite ones averaged"

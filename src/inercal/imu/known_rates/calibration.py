@@ -13,6 +13,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.geometry.earth import EARTH_RATE
@@ -30,11 +31,10 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S T omega + b, S = diag(S), T = 1 + misalignment (upper-triangular; T_ij: response of "
-    "gyro i to rate about j), b "
-    "= D_F, with |omega| the rate of the table in every orientation. Frame: z along the input axis of gyro z, y in the "
-    "plane of the input axes of gyros y and z."
+MODEL = Formula(
+    r"$y = S T \omega + b$, $S = \mathrm{diag}(S)$, $T = 1$ + misalignment (upper-triangular; $T_{ij}$: response of "
+    r"gyro $i$ to rate about $j$), $b = D_F$, with $|\omega|$ the rate of the table in every orientation. Frame: z "
+    "along the input axis of gyro z, y in the plane of the input axes of gyros y and z."
 )
 
 FRAME = "b, of the instrument: z along the input axis of gyro z, y in the plane of those of y and z"

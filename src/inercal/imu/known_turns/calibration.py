@@ -17,6 +17,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError, StudyError
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import EVERYTHING, Finding, Status
 from inercal.geometry.earth import EARTH_RATE
@@ -30,11 +31,10 @@ from inercal.noise.dwell_means import AllanFit
 from inercal.records.column import Triad
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S T omega + b, S = diag(S), T = 1 + misalignment (full; T_ij: response of gyro i to rate about j), b = D_F. "
-    "Frame: its axes x, y, z those of the three turns, taken as square to each other; turns "
-    "positive about the positive "
-    "axis by the right-hand rule."
+MODEL = Formula(
+    r"$y = S T \omega + b$, $S = \mathrm{diag}(S)$, $T = 1$ + misalignment (full; $T_{ij}$: response of gyro $i$ to "
+    "rate about $j$), $b = D_F$. Frame: its axes x, y, z those of the three turns, taken as square to each other; "
+    "turns positive about the positive axis by the right-hand rule."
 )
 
 FRAME = "b, of the instrument: its axes those of the three turns"

@@ -17,6 +17,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import RecordError, StudyError
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, Uncertainty, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate, timed
 from inercal.findings import Finding, Status
 from inercal.imu.identified import weakness
@@ -36,12 +37,11 @@ from inercal.instruments.terms import TERMS
 from inercal.records.places import counted, counted_names
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S (l + K2 l^2) + b, l = M f along the input axes, S = diag(K1), M = 1 + misalignment (upper-triangular; M_ij: "
-    "response of accelerometer i to specific force along j), b = K0, K2 = 0 unless it is "
-    "estimated, with |f| = g in every "
-    "pose. Frame: z along the input axis of accelerometer z, y in the plane of the input axes of "
-    "accelerometers y and z."
+MODEL = Formula(
+    r"$y = S (l + K_2 l^2) + b$, $l = M f$ along the input axes, $S = \mathrm{diag}(K_1)$, $M = 1$ + misalignment "
+    r"(upper-triangular; $M_{ij}$: response of accelerometer $i$ to specific force along $j$), $b = K_0$, $K_2 = 0$ "
+    "unless it is estimated, with $|f| = g$ in every pose. Frame: z along the input axis of accelerometer z, y in the "
+    "plane of the input axes of accelerometers y and z."
 )
 
 

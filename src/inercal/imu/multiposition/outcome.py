@@ -10,6 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import Uncertainty, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status, settled
 from inercal.imu.identified import spread_words
@@ -29,12 +30,12 @@ from inercal.records.column import Triad
 from inercal.records.places import counted
 from inercal.records.record import Record, recorded_temperature
 
-MODEL = (
-    "y = S M x + b, S = diag(scale factor), M = 1 + misalignment (M_ij: response of sensor i to the input along "
-    "frame axis j); accelerometers: K1, M upper-triangular, K0, with |f| = g in every static pose; gyro: S, T full, "
-    "D_F, and + G f where g-sensitivity, + D_R (t - t0) where the drift of the bias in this recording is estimated, t0 "
-    "= bias_time_s. Frame: z along the input axis of accelerometer z, y in the plane of the input axes of "
-    "accelerometers y and z."
+MODEL = Formula(
+    r"$y = S M x + b$, $S = \mathrm{diag}$(scale factor), $M = 1$ + misalignment ($M_{ij}$: response of sensor $i$ to "
+    "the input along frame axis $j$); accelerometers: $K_1$, $M$ upper-triangular, $K_0$, with $|f| = g$ in every "
+    "static pose; gyro: $S$, $T$ full, $D_F$, and $+ G f$ where g-sensitivity, $+ D_R (t - t_0)$ where the drift of "
+    r"the bias in this recording is estimated, $t_0$ = bias_time_s. Frame: z along the input axis of accelerometer z, "
+    "y in the plane of the input axes of accelerometers y and z."
 )
 
 FRAME = "b, of the instrument: z along the input axis of accelerometer z, y in the plane of those of y and z"

@@ -15,6 +15,7 @@ import numpy as np
 from inercal.arrays import Array, short_repr
 from inercal.estimate.basis import Basis, provenance
 from inercal.estimate.budget import Uncertainty
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.imu.limits import LIMITS
@@ -26,9 +27,9 @@ COMMAND = "temperature"
 REFERENCE = 25.0
 """T0 [degC], the temperature at which data sheets state coefficients."""
 
-MODEL = (
-    "y = c + T1 d + T2 d^2 + T3 d^3, d = T - T0; hyst: output on rising less that on falling temperature, its mean "
-    "over the range"
+MODEL = Formula(
+    "$y = c + T_1 d + T_2 d^2 + T_3 d^3$, $d = T - T_0$; hyst: output on rising less that on falling temperature, its "
+    "mean over the range"
 )
 
 

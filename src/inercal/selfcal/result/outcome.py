@@ -13,6 +13,7 @@ from inercal.arrays import Array
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, combine
 from inercal.estimate.consistency import Nis, nis
+from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
@@ -40,15 +41,18 @@ COMMAND = "selfcal"
 
 FRAME = "p, of the platform: X_p along accelerometer x, Y_p in the plane of accelerometers x and y"
 
-MODEL = (
-    "w_Ip^p = w_c + M w_c + kg0, M = [[0, ds_x, -do_x], [-do_y, 0, ds_y], [ds_z, -do_z, 0]]; "
-    "ax = ka0_x + (1 + ka1_x) fx, ay = ka0_y + (1 + ka1_y) (fy - eta_oy fx), "
-    "az = ka0_z + (1 + ka1_z) (fz + eta_pz fx - eta_oz fy); f the specific force in p (+g up at rest), w_c the "
-    "commanded or measured rate of the platform against inertial space"
+MODEL = Formula(
+    r"$w_{Ip}^p = w_c + M w_c + \mathrm{kg}_0$, $M = \begin{bmatrix}0 & \mathrm{ds}_x & -\mathrm{do}_x \\ "
+    r"-\mathrm{do}_y & 0 & \mathrm{ds}_y \\ \mathrm{ds}_z & -\mathrm{do}_z & 0\end{bmatrix}$; "
+    r"$a_x = \mathrm{ka}_{0,x} + (1 + \mathrm{ka}_{1,x}) f_x$, "
+    r"$a_y = \mathrm{ka}_{0,y} + (1 + \mathrm{ka}_{1,y}) (f_y - \eta_{oy} f_x)$, "
+    r"$a_z = \mathrm{ka}_{0,z} + (1 + \mathrm{ka}_{1,z}) (f_z + \eta_{pz} f_x - \eta_{oz} f_y)$; $f$ the specific "
+    "force in p (+g up at rest), $w_c$ the commanded or measured rate of the platform against inertial space"
 )
 
-EXTENSION = (
-    "; kg1 on the diagonal of M; q_encoders = qexp(beta) q, beta the zero of the encoders against the base"
+EXTENSION = Formula(
+    r"; $\mathrm{kg}_1$ on the diagonal of $M$; $q_{\mathrm{encoders}} = \mathrm{qexp}(\beta) q$, $\beta$ the zero of "
+    "the encoders against the base"
 )
 
 REFERENCES = (

@@ -1,17 +1,15 @@
-"""Positions of a turntable before they are taken: uncertainties with better or worse errors, and the axes in motion."""
+"""Positions of a turntable before they are taken: uncertainties with better or worse errors."""
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.designs.foresight import Course, Foresight, Lever
+from inercal.designs.foresight import Foresight, Lever
 from inercal.errors import StudyError
 from inercal.instruments.terms import shown_unit
-from inercal.rigs.chain import Chain, Joint
 from inercal.turntable.model import channels_of
 from inercal.turntable.positions.fit import choose_terms
 from inercal.turntable.positions.outcome import unit_of_term
@@ -20,9 +18,6 @@ from inercal.turntable.settings import TurntableSettings
 
 _MOST = 200
 """Positions of a test that is looked at."""
-
-_MOMENTS = 6
-"""Moments on the way to a position."""
 
 
 def foresight(settings: TurntableSettings) -> Foresight:
@@ -63,23 +58,10 @@ def foresight(settings: TurntableSettings) -> Foresight:
     return Foresight(names, units, sizes, tuple(levers), u)
 
 
-def course(settings: TurntableSettings) -> Course:
-    """The axes of the table from position to position. Raises `StudyError` for a grid to be analysed."""
-    angles, chain = _angles(settings), settings.chain
-    ways = [np.linspace(a, b, _MOMENTS + 1)[1:] for a, b in itertools.pairwise(angles)]
-    at = np.concatenate([angles[:1], *ways])
-    stops = _MOMENTS * np.arange(len(angles))
-    number = np.minimum(-(-np.arange(len(at)) // _MOMENTS), len(angles) - 1)
-    words = tuple(
-        f"{'position' if row in stops else 'to position'} {k + 1}: "
-        + ", ".join(f"{name} {angle:.4g} deg" for name, angle in zip(chain.joints, each, strict=True))
-        for row, (k, each) in enumerate(zip(number.tolist(), np.degrees(at).tolist(), strict=True))
-    )
-    joints = [k for k, each in enumerate(chain.elements) if isinstance(each, Joint)]
-    ends = [*joints[1:], len(chain.elements)]
-    poses = [Chain(chain.elements[:end]).attitude(at[:, : k + 1]) for k, end in enumerate(ends)]
-    axes = [np.eye(3)["xyz".index(each.axis)] for each in chain.elements if isinstance(each, Joint)]
-    return Course(words, np.stack(poses, axis=1), np.array(axes), stops, np.zeros((0, 2, 3)))
+def verticals(settings: TurntableSettings) -> Array:
+    """Directions (r, 3) of the vertical on the instrument in each position. Raises `StudyError` for a grid to be
+    analysed."""
+    return settings.chain.attitude(_angles(settings))[:, 2]
 
 
 def _angles(settings: TurntableSettings) -> Array:

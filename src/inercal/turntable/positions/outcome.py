@@ -13,6 +13,7 @@ from inercal.arrays import Array
 from inercal.designs.comparison import in_basis
 from inercal.estimate.basis import conditions_of, studied
 from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import WORST_BY_LENGTH
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
@@ -35,18 +36,21 @@ from inercal.turntable.settings import TurntableSettings
 COMMAND = "calibrate turntable"
 
 MODELS = {
-    "gyrowheel": (
-        "y = k_x w_x + k_y w_y + k_z w_z + DX_F + DX_X a_x + DX_Y a_y + DX_Z a_z + DX_XX a_x^2 + DX_YY a_y^2 "
-        "+ DX_XY a_x a_y + DX_XZ a_x a_z + DX_YZ a_y a_z (axis Y: kY, DY); a = [0 0 -1] C_nb, the gravity reference "
-        "in units of the site's gravity (an accelerometer reads -a); w the earth rate"
+    "gyrowheel": Formula(
+        r"$y = k_x w_x + k_y w_y + k_z w_z + \mathrm{DX}_F + \mathrm{DX}_X a_x + \mathrm{DX}_Y a_y$ "
+        r"${}+ \mathrm{DX}_Z a_z + \mathrm{DX}_{XX} a_x^2 + \mathrm{DX}_{YY} a_y^2 + \mathrm{DX}_{XY} a_x a_y$ "
+        r"${}+ \mathrm{DX}_{XZ} a_x a_z + \mathrm{DX}_{YZ} a_y a_z$ (axis Y: $\mathrm{kY}$, $\mathrm{DY}$); "
+        r"$a = \begin{bmatrix}0 & 0 & -1\end{bmatrix} C_{nb}$, the gravity reference in units of the site's gravity "
+        "(an accelerometer reads $-a$); $w$ the earth rate"
     ),
-    "gyro": (
-        "y_i = D_F_i + S_i (w_i + T_ij w_j + T_ik w_k) + G_ij f_j (+ G_ijk f_j f_k), f the specific force (+g up at "
-        "rest), w the earth rate"
+    "gyro": Formula(
+        "$y_i = D_{F,i} + S_i (w_i + T_{ij} w_j + T_{ik} w_k) + G_{ij} f_j$ ($+ G_{ijk} f_j f_k$), $f$ the specific "
+        "force (+g up at rest), $w$ the earth rate"
     ),
-    "accelerometer": (
-        "y_i = K0 + K1 (f_i + M_ip f_p + M_io f_o + K2 f_i^2 + K3 f_i^3 + Koq f_i |f_i| + Kip f_i f_p + Kio f_i f_o "
-        "+ Kpo f_p f_o + Kpp f_p^2 + Koo f_o^2), f the specific force (+g up at rest), p and o the axes after i"
+    "accelerometer": Formula(
+        r"$y_i = K_0 + K_1 (f_i + M_{ip} f_p + M_{io} f_o + K_2 f_i^2 + K_3 f_i^3 + \mathrm{Koq} f_i |f_i|$ "
+        r"${}+ \mathrm{Kip} f_i f_p + \mathrm{Kio} f_i f_o + \mathrm{Kpo} f_p f_o + \mathrm{Kpp} f_p^2 "
+        r"+ \mathrm{Koo} f_o^2)$, $f$ the specific force (+g up at rest), $p$ and $o$ the axes after $i$"
     ),
 }
 

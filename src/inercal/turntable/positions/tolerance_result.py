@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from inercal.designs.tolerances import LOOSEST, TIGHTEST
+from inercal.estimate.table import aligned
 from inercal.instruments.terms import shown_unit
 from inercal.turntable.display import per_g
 from inercal.turntable.positions.fit import earth_rate_of
@@ -114,7 +115,7 @@ def table(made: dict[str, Any], settings: TurntableSettings) -> str:
         )
         for each in made["compare"]
     ]
-    return "\n\n".join([_aligned(rows), _aligned(goals), _aligned(plans)])
+    return "\n\n".join("\n".join(aligned(each)) for each in (rows, goals, plans))
 
 
 def goal_texts(goal: Mapping[str, Any], settings: TurntableSettings) -> tuple[str, ...]:
@@ -161,15 +162,3 @@ def study_tables(designed: ToleranceDesign) -> str:
         for row in np.tile(trial.plan.angles, (trial.repeats, 1))
     )
     return "\n".join([*lines, "", "[positions]", f"list = [{positions}]", ""])
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> str:
-    """Rows of cells as aligned text."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if i == 0 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    )

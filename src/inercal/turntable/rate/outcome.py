@@ -9,6 +9,7 @@ import numpy as np
 
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, Uncertainty, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
@@ -21,10 +22,10 @@ from inercal.turntable.rate.fit import RateFit, approaches
 from inercal.turntable.rate.stays import Input, RateDwells
 from inercal.turntable.settings import TurntableSettings
 
-MODEL = (
-    "y = D_F + S (x + S_asym |x|/2 + S2 x^2 + S3 x^3), x the rate about the gyro's axis: the table's rate times the "
-    "cosine of the axes, and the mean of earth rate over the stay; D_F holds what gravity does at this attitude; of a "
-    "gyro i across the turning axis k: y = D_F + S (x + T_ik w_k), S as stated"
+MODEL = Formula(
+    r"$y = D_F + S (x + S_{\mathrm{asym}} |x|/2 + S_2 x^2 + S_3 x^3)$, $x$ the rate about the gyro's axis: the table's "
+    "rate times the cosine of the axes, and the mean of earth rate over the stay; $D_F$ holds what gravity does at "
+    "this attitude; of a gyro $i$ across the turning axis $k$: $y = D_F + S (x + T_{ik} w_k)$, $S$ as stated"
 )
 
 REFERENCES = (

@@ -14,6 +14,7 @@ from inercal.arrays import Array, short_repr
 from inercal.errors import StudyError
 from inercal.estimate.executors import Executor
 from inercal.estimate.rounding import concise
+from inercal.estimate.table import aligned
 from inercal.records.places import counted
 from inercal.rigs.outputs import table_outputs
 from inercal.sensitivities import averages
@@ -218,17 +219,9 @@ def table(analysed: Analysed) -> str:
         )
         for k in np.argsort(-share.total, kind="stable")
     ]
-    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if i in (0, len(head) - 1) else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in (head, *rows)
-    ]
     return "\n".join(
         [
-            *lines,
+            *aligned([head, *rows], (0, len(head) - 1)),
             "",
             f"S, ST: first and total order over {', '.join(indices.outputs)} and all positions, each output in "
             "units of its reference",

@@ -11,6 +11,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, combine
+from inercal.estimate.formula import Formula
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import shown_unit
@@ -23,10 +24,11 @@ from inercal.turntable.readings import Readings
 from inercal.turntable.settings import TurntableSettings
 from inercal.turntable.steps.response import Response, Tilted
 
-MODEL = (
-    "y = K0 + K1 (x - d + s K_hyst/2) + drift t, x the specific force along the axis, s = +1 where it was last "
-    "raised, -1 lowered; within the dead zone, of width K_dz about m, d = x - m; below it d = -q, above it q, "
-    "from 0 to K_dz/2; K_th = max(K_dz/2, 2 q)"
+MODEL = Formula(
+    r"$y = K_0 + K_1 (x - d + s K_{\mathrm{hyst}}/2) + D t$, $D$ the drift, $x$ the specific force along the axis, "
+    r"$s = +1$ where it was last raised, $-1$ lowered; within the dead zone, of width $K_{\mathrm{dz}}$ about $m$, "
+    r"$d = x - m$; below it $d = -q$, above it $q$, from 0 to $K_{\mathrm{dz}}/2$; "
+    r"$K_{\mathrm{th}} = \max(K_{\mathrm{dz}}/2, 2 q)$"
 )
 
 REFERENCES = (

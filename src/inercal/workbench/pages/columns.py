@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import suppress
@@ -17,9 +16,9 @@ from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.records.channels import is_channel, nearest
 from inercal.records.guess import columns_of
-from inercal.workbench.form import Widget, as_toml, changed
+from inercal.studies.text import changed, toml, with_keys
+from inercal.workbench.form import Widget, as_toml
 from inercal.workbench.pages.frame import button, copy, heading, refused, saved, table, told
-from inercal.workbench.plans import with_keys
 from inercal.workbench.sessions import MAP, Session, put
 
 _NONE = ""
@@ -61,7 +60,7 @@ def columns_there(session: Session) -> dict[Path, tuple[str, ...]]:
 
 def _written(origin: Any) -> str:
     """The place of a channel in its file, as the map writes it."""
-    return json.dumps(list(origin) if isinstance(origin, tuple) else origin, ensure_ascii=False)
+    return toml(origin)
 
 
 class Columns:

@@ -1,10 +1,10 @@
-"""Design: a test before it is made: its plan on a sphere and in motion, and the uncertainties to expect."""
+"""Design: a test before it is made: where its plan stops, and the uncertainties to expect."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 import shlex
+import threading
 from collections.abc import Callable
 
 import numpy as np
@@ -12,9 +12,12 @@ from nicegui import events, ui
 
 from inercal._files import read_bytes
 from inercal.arrays import Array
-from inercal.designs.foresight import Course, Foresight
+from inercal.designs.foresight import Foresight
 from inercal.errors import InercalError
 from inercal.estimate.rounding import short
+from inercal.report.panels import draw
+from inercal.report.sphere import hemispheres
+from inercal.studies.text import with_keys
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import (
@@ -23,19 +26,20 @@ from inercal.workbench.pages.frame import (
     command,
     framed,
     heading,
-    picture,
     refused,
     report,
     table,
     told,
 )
 from inercal.workbench.pages.run import WORDS
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_keys, with_lines
-from inercal.workbench.scenes import gimbals, motion, sphere
+from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
 from inercal.workbench.sessions import STUDY, Session, put
 
 _MIDDLE, _END = 50, 100
 """Places of a slider: as stated in the middle, where a browser puts it, ten times as much or a tenth at the ends."""
+
+_DRAWING = threading.Lock()
+"""The style of a picture is that of the whole process while it is drawn."""
 
 
 def add(bench: Bench) -> None:
@@ -52,7 +56,6 @@ def add(bench: Bench) -> None:
                 ui.label("There is no study yet, which would say what is planned.")
                 ui.link("Begin one", f"/sessions/{session.id}/study")
                 return
-            ui.add_head_html('<script src="/static/motion.js" defer></script>')
             desk = Desk(bench, session)
             await ui.context.client.connected()
             await desk.judge()
@@ -70,12 +73,7 @@ class Desk:
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
             with ui.element("div"):
                 self._plan()
-            self.views = ui.element("div").classes("w-full")
-        with self.views:
-            heading("The test in motion")
-            with ui.element("div").classes("w-full grid grid-cols-1 gap-2 sm:grid-cols-2") as self.scenes:
-                ui.spinner()
-            self._moments()
+            self.stops = ui.element("div").classes("w-full")
         heading("What if")
         ui.label("Move a slider: the uncertainties follow. In the middle is what the study states.").classes(
             "quiet"
@@ -106,17 +104,6 @@ class Desk:
             "quiet text-sm"
         )
 
-    def _moments(self) -> None:
-        """The slider over the moments of the test, and its words."""
-        with ui.row(wrap=False).classes("w-full items-center"):
-            button("Play", lambda: None, label="play or stop the test").on(
-                "click", js_handler="() => inercalPlay()"
-            )
-            ui.element("input").props(
-                'type=range id=moment min=0 max=0 aria-label="moment of the test" oninput="inercalMoment()"'
-            ).classes("grow")
-        ui.element("div").props('id=moment-words aria-live="off"').classes("quiet text-sm")
-
     async def named(self, name: str) -> None:
         """Take a plan by its name."""
         with told():
@@ -143,22 +130,22 @@ class Desk:
     async def judge(self, lines: str | None = None) -> None:
         """Show what the plan makes expect; ``lines`` were typed, and stay as they are."""
         try:
-            study, foresight, course = await asyncio.to_thread(self.bench.foreseen, self.session)
+            study, foresight, up = await asyncio.to_thread(self.bench.foreseen, self.session)
+            drawn = await asyncio.to_thread(_stops, up) if len(up) else ""
         except InercalError as error:
             self.say(str(error), False)
             self.foresight = None
-            for each in (self.levers, self.numbers, self.same):
+            for each in (self.levers, self.numbers, self.same, self.stops):
                 each.clear()
-            self.scenes.clear()
             return
         self.shown = lines_of(study) if lines is None else lines
         self.lines.set_value(self.shown)
         self.foresight, self.factors = foresight, np.ones(len(foresight.levers))
-        self.draw(course)
+        self.draw(drawn)
         self.table(foresight)
         self.sliders(foresight)
         self.repeat()
-        count = f"{len(course.stops)} stops, " if len(course.stops) else ""
+        count = f"{len(up)} stops, " if len(up) else ""
         self.say(f"{count}{len(foresight.names)} values are predicted.", True)
 
     def say(self, words: str, good: bool) -> None:
@@ -166,20 +153,15 @@ class Desk:
         self.verdict.set_text(words)
         self.verdict.classes(replace="ok" if good else "bad")
 
-    def draw(self, course: Course) -> None:
-        """The sphere and the gimbals."""
-        self.scenes.clear()
-        drawn = {"What turns; drag to look from elsewhere": gimbals(course)}
-        if len(course.stops):
-            drawn = {"Where up is on the instrument at each stop": sphere(course), **drawn}
-        places = {}
-        with self.scenes:
-            for words, scene in drawn.items():
-                with ui.element("div"):
-                    plot = picture(scene.figure, words)
-                    ui.label(words).classes("quiet text-sm")
-                places[plot.html_id] = scene
-        ui.run_javascript(f"inercalMotion({json.dumps(motion(course, places))})")
+    def draw(self, drawn: str) -> None:
+        """The picture of the stops, none of a model in motion."""
+        self.stops.clear()
+        if drawn:
+            with self.stops:
+                heading("Where up is on the instrument")
+                words = "Direction of the vertical on the axes of the instrument at each stop, in their order"
+                ui.image(drawn).props(f'alt="{words}" fit=contain').classes("w-full")
+                ui.label(f"{words}; two halves of the sphere, seen along −z.").classes("quiet text-sm")
 
     def table(self, foresight: Foresight) -> None:
         """Uncertainties as stated and now, with the largest source."""
@@ -310,3 +292,9 @@ class Desk:
         with told():
             await self.write(with_found(self.session.kind, self.text, found))
             ui.notify("The plan found is in the study.", type="positive")
+
+
+def _stops(up: Array) -> str:
+    """The address of a picture of verticals (r, 3) on the instrument."""
+    with _DRAWING:
+        return draw("Stops", "", [hemispheres(up)], 3.4).uri

@@ -10,8 +10,9 @@ from nicegui import events, ui
 
 from inercal._files import read_bytes
 from inercal.errors import InercalError
+from inercal.studies.text import changed, parsed
 from inercal.workbench.bench import KINDS, Bench
-from inercal.workbench.form import Key, Table, as_toml, changed, parsed, problem, tables
+from inercal.workbench.form import Key, Table, as_toml, problem, tables
 from inercal.workbench.pages.frame import button, command, copy, framed, heading, refused, saved, told
 from inercal.workbench.sessions import STUDY, Session, put
 
