@@ -176,7 +176,11 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
 @dataclass(frozen=True, eq=False)
 class Start:
     """A start other than the first encoder reading: ``attitude`` (4,) q_bp at the first row, and its standard deviation
-    ``sigma`` [rad] about each axis."""
+    ``sigma`` [rad] about each axis.
+
+    Where encoders read, it may be off by any angle for ``error-state`` and ``map``. Where they never do, by up to 45
+    degrees for ``map``, and by none to speak of for a filter: 1 degree leaves coefficients several u off.
+    """
 
     attitude: Array
     sigma: float
