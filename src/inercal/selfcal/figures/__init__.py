@@ -86,7 +86,7 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
     if estimate.names:
         drawings.append(correlation(estimate))
         drawings += [budget(estimate)] if estimate.budget else []
-    return drawings + compare_pictures(calibration)
+    return drawings + _compare_pictures(calibration)
 
 
 def _path(calibration: Calibration) -> Picture:
@@ -95,7 +95,7 @@ def _path(calibration: Calibration) -> Picture:
     return path_of(recording.t, recording.th, "The path", "Gimbal angles that the encoders read")
 
 
-def compare_pictures(calibration: Calibration) -> list[Picture]:
+def _compare_pictures(calibration: Calibration) -> list[Picture]:
     """Distance of the other filters from the one that counts; no picture without others."""
     filters = _all(calibration)
     if len(filters) < 2:

@@ -53,13 +53,13 @@ from inercal.selfcal.filters.residuals import (
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import TAU
 
-BAND = 5
+_BAND = 5
 """Entries below the diagonal that the attitudes' normal matrix has."""
 
-STEP = 1e-6
+_STEP = 1e-6
 """Size of the last step, over the standard uncertainties of the coefficients, at which the iteration ends."""
 
-ITERATIONS = 30
+_ITERATIONS = 30
 
 
 def estimate_map(
@@ -86,9 +86,9 @@ def estimate_map(
     measured, loose = readings(recording, problem), broken(recording, problem, start)
     q, c = _first_guess(recording, problem, measured, start), problem.mean
     p = len(c)
-    message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
+    message = f"the iteration did not end in {_ITERATIONS} steps, so far is the recording from the model"
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
                 terms = _terms_at(q, c, recording, problem, measured, first, loose, of_encoders)
@@ -98,7 +98,7 @@ def estimate_map(
             break
         covariance, u = step.covariance, step.attitude_u
         q, c = normalize(boxplus(q, step.attitudes)), c + problem.prior * step.coefficients
-        if np.max(np.abs(step.coefficients) / np.sqrt(np.diag(covariance))) < STEP:
+        if np.max(np.abs(step.coefficients) / np.sqrt(np.diag(covariance))) < _STEP:
             message = ""
             break
     covariance = covariance * np.outer(problem.prior, problem.prior)
@@ -229,7 +229,7 @@ def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     of_sensed = np.concatenate([of_rows.residual[:, :, None], of_rows.by_coefficients], axis=2)
     right[1:] += seen @ of_sensed + following @ of_process
     right[:-1] += last @ of_process
-    band = np.zeros((BAND + 1, 3 * n))
+    band = np.zeros((_BAND + 1, 3 * n))
     for j in range(3):
         for i in range(3):
             if i >= j:

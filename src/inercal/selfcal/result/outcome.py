@@ -47,7 +47,7 @@ MODEL = (
     "commanded or measured rate of the platform against inertial space"
 )
 
-EXTENSION = (
+_EXTENSION = (
     "; kg1 on the diagonal of M; q_encoders = qexp(beta) q, beta the zero of the encoders against the base"
 )
 
@@ -77,7 +77,7 @@ def assemble(
         COMMAND,
         settings,
         recording.sources,
-        MODEL + (EXTENSION if {"kg1", "beta"} <= {*kinds} else "") + _on_rig(kinds),
+        MODEL + (_EXTENSION if {"kg1", "beta"} <= {*kinds} else "") + _on_rig(kinds),
         REFERENCES + ESTIMATORS[filtered.kind].publications,
         _conditions(recording, settings),
     )

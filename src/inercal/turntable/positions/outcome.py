@@ -34,7 +34,7 @@ from inercal.turntable.settings import TurntableSettings
 
 COMMAND = "calibrate turntable"
 
-MODELS = {
+_MODELS = {
     "gyrowheel": (
         "y = k_x w_x + k_y w_y + k_z w_z + DX_F + DX_X a_x + DX_Y a_y + DX_Z a_z + DX_XX a_x^2 + DX_YY a_y^2 "
         "+ DX_XY a_x a_y + DX_XZ a_x a_z + DX_YZ a_y a_z (axis Y: kY, DY); a = [0 0 -1] C_nb, the gravity reference "
@@ -67,7 +67,7 @@ class Terms:
     slope: Array
 
 
-def terms_of(fit: Regression) -> Terms:
+def _terms_of(fit: Regression) -> Terms:
     """Values of the terms of all channels."""
     values, slope = np.zeros(len(fit.c)), np.zeros((len(fit.c), len(fit.c)))
     for channel, block in zip(fit.model.channels, fit.model.blocks, strict=True):
@@ -111,7 +111,7 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
 def assemble(record: Record, readings: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
     unit = readings.unit.si
-    model, conditions = MODELS[settings.instrument.kind], _conditions(record, readings, settings)
+    model, conditions = _MODELS[settings.instrument.kind], _conditions(record, readings, settings)
     sources_read = (*record.sources, *settings.chain.sources)
     basis = studied(COMMAND, settings, sources_read, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
@@ -139,7 +139,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         return nothing(*_without_fit(readings, fitting, settings))
     fit, drift = fitting.fit, fitting.drift
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        terms = terms_of(fit)
+        terms = _terms_of(fit)
         finite = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))
