@@ -32,7 +32,6 @@ OURS = {
     "svd-qukf, Cholesky": (Filter("svd-qukf", factor="cholesky"), CHOLESKY, {"at_least": 60.0}),
     "svd-qukf, eigen": (Filter("svd-qukf", factor="eigen"), EIGEN, {"at_least": 18.0}),
     "svd-qukf, SVD": (Filter("svd-qukf", factor="svd"), EIGEN, {}),
-    "mukf": (Filter("mukf"), CHOLESKY, {}),
     "gimbal-ukf": (Filter("gimbal-ukf"), CHOLESKY, {}),
     "gimbal-ukf, Euler": (Filter("gimbal-ukf", integration="euler"), CHOLESKY, {}),
     "error-state": (Filter("error-state"), CHOLESKY, {"at_least": 150.0}),

@@ -67,9 +67,8 @@ Map, lower floors first; each imports only from those above its own line
     strapdown                  coefficients, kernels, samples, rests, batch, error_state, restricted, averaged,
                                left_out, considered, bounds, design, simulate, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
-    selfcal                    platform (rig, plan, model), filters (error_state, multiplicative, quaternion,
-                               gimbal, batch), before (bounds, observability, path_design,
-                               simulate), diagnosis, result, task
+    selfcal                    platform (rig, plan, model), filters (error_state, quaternion, gimbal, batch),
+                               before (bounds, observability, path_design, simulate), diagnosis, result, task
     aoa                        layout, motion, simulate; reading, fusion (model, loop, smoother), paper (static, lever,
                                frequency), reference, diagnosis, result, task
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins

@@ -377,15 +377,7 @@ def test_bash_completes_verbs_kinds_options_and_choices(tmp_path, scripts):
         "inercal cal": {"calibrate"},
         "inercal simulate ''": {"imu", "strapdown", "turntable", "selfcal", "aoa"},
         "inercal aoa --sta": {"--static", "--states"},
-        "inercal selfcal --filter ''": {
-            "error-state",
-            "mukf",
-            "svd-qukf",
-            "gimbal-ukf",
-            "map",
-            "lm",
-            "linear",
-        },
+        "inercal selfcal --filter ''": {"error-state", "svd-qukf", "gimbal-ukf", "map"},
         "inercal aoa log.csv --states ''": {"8", "11", "15", "19"},
         "inercal calibrate imu --study ''": {""},
     }

@@ -116,7 +116,7 @@ COMMANDS = {
                   "aoa model.csv --study aoa.toml --stream", "inspect model.csv"],
     "unit.csv": ["calibrate strapdown unit.csv --study strapdown.toml"],
     "table.csv": ["calibrate turntable table.csv --study turntable.toml"],
-    "platform.csv": [f"selfcal platform.csv --study selfcal.toml --filter {kind}" for kind in ("error-state", "lm")]
+    "platform.csv": [f"selfcal platform.csv --study selfcal.toml --filter {kind}" for kind in ("error-state", "map")]
     + ["selfcal platform.csv --study selfcal.toml --stream"],
 }  # fmt: skip
 TABLE = "t [s],position [1],phi1 [deg],phi2 [deg],y_x [deg/h]"

@@ -172,7 +172,7 @@ def test_no_heading_is_told_at_the_poles(latitude):
 @pytest.mark.parametrize("degrees", [3.0, pytest.param(1.0, marks=pytest.mark.campaign)])
 def test_a_base_far_off_is_found(degrees):
     """Prior of degrees about all axes, true beta half of it or more: all estimators have the errors that they state."""
-    values = {kind: [] for kind in ("error-state", "mukf", "map")}
+    values = {kind: [] for kind in ("error-state", "map")}
     prior = study().prior.copy()
     prior[BETA] = degrees * DEG
     for seed in range(6):

@@ -21,8 +21,8 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.before.bounds import bounds
 from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.batch import estimate_map, inverse_diagonal, terms_at
-from inercal.selfcal.filters.problem import problem
+from inercal.selfcal.filters.batch import _terms_at, estimate_map, inverse_diagonal
+from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.residuals import (
     first_reading,
     readings,
@@ -76,17 +76,17 @@ def test_jacobians_of_the_exponential(length):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("extended", [False, True])
-def test_derivatives_of_allterms_at(extended):
+def test_derivatives_of_all_terms(extended):
     recording, given, _ = recorded(step=10.0, truth=EXTENDED_TRUTH, filter=Filter(extended=extended))
     rng = np.random.default_rng(4)
     p, n = len(given.prior), len(recording.t)
     c = given.prior * rng.standard_normal(p)
     measured, first = readings(recording, given), first_reading(recording, given)
     q = boxplus(np.vstack([first.attitude, measured.attitude]), 0.2 * rng.standard_normal((n, 3)))
-    terms = terms_at(q, c, recording, given, measured, first)
+    terms = _terms_at(q, c, recording, given, measured, first)
 
     def changed(attitudes, z):
-        return terms_at(boxplus(q, attitudes), c + given.prior * z, recording, given, measured, first)
+        return _terms_at(boxplus(q, attitudes), c + given.prior * z, recording, given, measured, first)
 
     def check(derivative, residual, move, size):
         # residuals change by minus the derivative; steps differ in size over the rows, hence relative
@@ -311,3 +311,20 @@ def test_perfect_attitude_leaves_the_outputs_of_the_coefficients():
     read = measured.acc - sensed(level, c, measured, given).residual[:, :3] / measured.acc_weight
     assert_allclose(read[:, 1], 1e-3 + 1.001 * g)
     assert_allclose(read[:, [0, 2]], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 45.0])
+@pytest.mark.parametrize("name", ["paper", "best"])
+def test_a_wrong_start_without_encoders_is_forgotten(name, degrees):
+    """Told as such, up to 45 deg about any axis: the coefficients of a start at the truth, within 0.01 u."""
+    settings = study(plan=path(name, 1.0))
+    made, given = simulate(experiment(settings), np.random.default_rng(6)), problem(settings)
+    directions = [*np.eye(3), *np.random.default_rng(17).standard_normal((2, 3))]
+    th = np.where(np.arange(len(made.recording.t))[:, None] > 0, np.nan, made.recording.th)
+    blind = replace(made.recording, th=th)
+    near = estimate_map(blind, given, Start(made.attitude[0], np.radians(degrees)))
+    for direction in directions:
+        off = np.radians(degrees) * direction / np.linalg.norm(direction)
+        found = estimate_map(blind, given, Start(boxplus(made.attitude[0], off), np.radians(degrees)))
+        assert found.converged
+        assert_allclose(found.coefficients / sigmas(near), near.coefficients / sigmas(near), atol=0.01)

@@ -17,7 +17,6 @@ from paper_study import study
 from inercal.selfcal.before import bounds
 from inercal.selfcal.filters import error_state
 from inercal.selfcal.filters import gimbal
-from inercal.selfcal.filters import multiplicative
 from inercal.selfcal.filters import quaternion
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.considered import both
@@ -33,7 +32,7 @@ for extended in (False, True):
     settings = study(plan=Plan((Turn("z", 0.05), Turn("x", 0.05))), filter=Filter(extended=extended))
     recording = simulate(experiment(settings), np.random.default_rng(4)).recording
     of = problem(settings)
-    for kind in ("linear", "mukf", "svd-qukf", "gimbal-ukf", "error-state"):
+    for kind in ("svd-qukf", "gimbal-ukf", "error-state"):
         got = estimate(recording, of, kind)
         u = np.sqrt(np.diag(got.covariance))
         found[f"{kind} {extended}"] = [*(got.coefficients / of.prior), *(u / of.prior), got.nis_mean]
@@ -44,7 +43,7 @@ for extended in (False, True):
     changes /= of.prior[:, None]
     found[f"not fitted {extended}"] = [*changes.ravel() / np.abs(changes).max()]
     found[f"innovations {extended}"] = [*slopes.ravel() / np.abs(slopes).max()]
-kernels = [bounds.riccati, *(each._advance for each in (error_state, gimbal, multiplicative, quaternion))]
+kernels = [bounds.riccati, *(each._advance for each in (error_state, gimbal, quaternion))]
 missed = sum(sum(each.stats.cache_misses.values()) for each in kernels) if hasattr(kernels[0], "stats") else None
 print(json.dumps({"found": found, "missed": missed}))
 """

@@ -6,7 +6,7 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 from paper_study import DEG, study
-from unscented_twins import RIGS, angle_rates, gimbal, joints
+from unscented_twin import RIGS, angle_rates, gimbal, joints
 
 from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
 from inercal.selfcal.before.simulate import experiment, simulate
@@ -136,16 +136,16 @@ def test_the_kernel_is_its_numpy_twin(rig, extended, integration):
 
 
 @pytest.mark.parametrize("rig", [RIGS[0], RIGS[4], RIGS[8]])
-def test_away_from_lock_it_agrees_with_the_multiplicative_filter(rig):
+def test_away_from_lock_it_agrees_with_the_error_state_filter(rig):
     """Representation does not matter: within 0.004 sigma at nominal noise, gimbals in any order."""
     settings = study(gimbals=Gimbals(*rig))
     given, prepared = problem(settings), experiment(settings)
     for seed in range(3):
         recording = simulate(prepared, np.random.default_rng(seed)).recording
-        found, peer = (estimate(recording, given, kind) for kind in ("gimbal-ukf", "mukf"))
+        found, peer = (estimate(recording, given, kind) for kind in ("gimbal-ukf", "error-state"))
         assert found.converged
         assert in_sigma(found.coefficients, peer.coefficients, peer.covariance) < 0.004
-        # the floor of the quaternion filters' encoder noise is worth 0.05^2 / 2
+        # the floor of that filter's encoder noise is worth 0.05^2 / 2
         np.testing.assert_allclose(np.diag(found.covariance), np.diag(peer.covariance), rtol=2e-3)
         apart = boxminus(found.history.attitude, peer.history.attitude) / peer.history.attitude_u
         assert np.abs(apart).max() < 0.05

@@ -248,7 +248,7 @@ def test_the_result_holds_what_the_interface_asks(sound):
     assert text["statistics"]["condition"] > 1.0
 
 
-@pytest.mark.parametrize("kind", ["mukf", "map"])
+@pytest.mark.parametrize("kind", ["svd-qukf", "map"])
 def test_other_estimators_give_the_same_estimate(sound, kind):
     settings, result, _ = sound
     other, _ = assembled(settings, kind=kind)

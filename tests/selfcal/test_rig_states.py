@@ -309,7 +309,7 @@ def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
     assert off.max() > 5.0
 
 
-@pytest.mark.parametrize("kind", ["error-state", "map", "mukf"])
+@pytest.mark.parametrize("kind", ["error-state", "map"])
 def test_estimators_agree_on_a_rig_with_all_errors(kind):
     kinds = tuple(each for each in WHOLE if kind != "map" or each not in BIAS_WALK)
     settings = replace(BASE, model=Model(kinds))

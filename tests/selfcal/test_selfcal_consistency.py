@@ -23,10 +23,9 @@ ALL = pytest.mark.campaign
 @pytest.mark.parametrize("noise", ["nominal", pytest.param("low", marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(
     ("kind", "runs"),
-    [(kind, FEW) for kind in ("error-state", "mukf", "svd-qukf")]
+    [(kind, FEW) for kind in ("error-state", "svd-qukf")]
     + [
         pytest.param("error-state", RUNS, marks=ALL),
-        pytest.param("mukf", RUNS, marks=ALL),
         pytest.param("svd-qukf", RUNS // 2, marks=ALL),
     ],
 )

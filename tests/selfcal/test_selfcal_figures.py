@@ -309,9 +309,9 @@ def test_filters_side_by_side_with_the_truth():
 
 def test_filters_side_by_side_without_a_truth():
     """Differences from the first, over its uncertainty; a filter that failed says so."""
-    first, other = filtered(), filtered("mukf", seed=6)
+    first, other = filtered(), filtered("svd-qukf", seed=6)
     _, apart, costs = side_by_side(
-        {"error-state": first, "mukf": other, "lm": diverged()}, np.zeros(18), None, 0.2, {}
+        {"error-state": first, "svd-qukf": other, "map": diverged()}, np.zeros(18), None, 0.2, {}
     )
     u = np.sqrt(np.diag(first.covariance))
     linear = (other.coefficients - first.coefficients) / u

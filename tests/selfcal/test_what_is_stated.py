@@ -101,7 +101,7 @@ def test_the_limit_of_the_verdict_is_raised_by_what_a_stated_tilt_explains():
     true = estimate(made, problem(with_tilt(PLAIN, 10.0, -8.0))).nis_mean
     left = agreeing.statistics["nis_mean"] - (agreeing.statistics["nis_limit"] - PLAIN_LIMIT)
     assert left == pytest.approx(true, abs=0.02)
-    other = estimate(made, problem(doubted), "mukf")
+    other = estimate(made, problem(doubted), "map")
     assert verdict(other, made, doubted)[0] is Status.OK
 
 

@@ -27,7 +27,7 @@ from inercal.stream.run import Saving, run
 from inercal.stream.selfcal import Selfcal
 
 DEG = np.pi / 180.0
-RECURSIVE = ("error-state", "mukf", "svd-qukf", "gimbal-ukf")
+RECURSIVE = ("error-state", "svd-qukf", "gimbal-ukf")
 
 #: through more than half a turn, so that encoders wrap, and away from gimbal lock
 SHORT = Plan((Turn("z", 210 * DEG), Turn("y", 20 * DEG), Rest(4.0), Turn("x", -30 * DEG)), rate=5.0 * DEG)
@@ -83,7 +83,7 @@ def test_lines_are_the_history_of_the_whole_file_to_the_last_digit(kind, tmp_pat
 
 @pytest.mark.parametrize(
     "filter_",
-    [Filter("svd-qukf", extended=True), Filter(gating=Gating("channel")), Filter("mukf", factor="svd")],
+    [Filter("svd-qukf", extended=True), Filter(gating=Gating("channel")), Filter("gimbal-ukf", factor="svd")],
 )
 def test_so_they_are_with_other_states_gating_and_factors(filter_, tmp_path):
     settings = study(plan=None, filter=filter_)
@@ -91,11 +91,10 @@ def test_so_they_are_with_other_states_gating_and_factors(filter_, tmp_path):
     assert live(text, settings) == of_file(text, settings, tmp_path)
 
 
-@pytest.mark.parametrize("kind", ["error-state", "mukf"])
-def test_rows_are_gone_through_again_where_a_file_takes_a_second_pass(kind, tmp_path):
+def test_rows_are_gone_through_again_where_a_file_takes_a_second_pass(tmp_path):
     """Of 281 rows the last pass is at 256: a tenth of u from the two of a file, which are of all rows. Killed and
     resumed, the same digits."""
-    settings = study(plan=None, filter=Filter(kind, extended=True))
+    settings = study(plan=None, filter=Filter(extended=True))
     text, saving = recorded(tmp_path, 2), Saving(tmp_path / "state", 7)
     lines = live(text, settings)
     assert lines != of_file(text, settings, tmp_path)
@@ -317,7 +316,7 @@ def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
     others = [
         study("paper", "high", plan=None),
         replace(base, prior=2.0 * base.prior),
-        replace(base, filter=Filter("mukf")),
+        replace(base, filter=Filter("svd-qukf")),
         replace(base, filter=Filter(gating=Gating("two"))),
         replace(base, base=replace(base.base, heading=0.1)),
     ]

@@ -313,8 +313,14 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
             "model.states: found bias_walk for map",
         ),
         (
-            {"model": {"states": "rig"}, "filter": {"kind": "lm"}},
-            "model.states: found gamma, .* for lm, which has none",
+            {"model": {"states": "rig"}, "filter": {"kind": "svd-qukf"}},
+            "model.states: found gamma, .* for svd-qukf, which has none",
+        ),
+        ({"filter": {"kind": "mukf"}}, "filter.kind: found 'mukf', .* expected 'error-state' in its place"),
+        ({"filter": {"kind": "lm"}}, "filter.kind: found 'lm', .* expected 'map' in its place"),
+        (
+            {"filter": {"kind": "linear"}},
+            "filter.kind: found 'linear', .* expected 'error-state' in its place",
         ),
         (
             {"model": {"states": "rig"}, "filter": {"extended": True}},
@@ -412,7 +418,7 @@ def test_states_of_the_rig():
 @pytest.mark.parametrize("kind", KINDS)
 def test_states_are_those_of_the_rig_where_the_estimator_has_them(kind):
     """And the paper's where it does not."""
-    kinds = RIG if kind in ("error-state", "mukf", "map") else PAPER
+    kinds = RIG if kind in ("error-state", "map") else PAPER
     assert study(filter={"kind": kind}).kinds == kinds
     assert study(filter={"kind": kind, "extended": True}).kinds == EXTENDED_MODEL
     assert study(filter={"kind": kind}, model={"states": "paper"}).kinds == PAPER

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple, get_args
 
-FilterKind = Literal["error-state", "mukf", "svd-qukf", "gimbal-ukf", "map", "lm", "linear"]
+FilterKind = Literal["error-state", "svd-qukf", "gimbal-ukf", "map"]
 FactorKind = Literal["cholesky", "eigen", "svd"]
 
 KINDS: Final[tuple[FilterKind, ...]] = get_args(FilterKind)
 """All estimators, the product's default first."""
 
 FACTOR_OF: Final[Mapping[FilterKind, FactorKind]] = {
-    "mukf": "cholesky",
     "svd-qukf": "eigen",
     "gimbal-ukf": "cholesky",
 }
 """Factor of the covariance that each sigma-point filter takes where the study names none."""
+
+GONE: Final[Mapping[str, FilterKind]] = {"mukf": "error-state", "lm": "map", "linear": "error-state"}
+"""Estimators of version 0.2.0 that are no more, and what serves instead of each."""
 
 
 class Estimator(NamedTuple):
@@ -36,22 +38,10 @@ _LEFFERTS = (
     "E. J. Lefferts, F. L. Markley, M. D. Shuster, Kalman filtering for spacecraft attitude estimation, Journal of "
     "Guidance, Control, and Dynamics 5 (1982) 417"
 )
-_CRASSIDIS = (
-    "J. L. Crassidis, F. L. Markley, Unscented filtering for spacecraft attitude estimation, Journal of Guidance, "
-    "Control, and Dynamics 26 (2003) 536"
-)
-
-_GREWAL = (
-    "M. S. Grewal, V. D. Henderson, R. S. Miyasako, Application of Kalman filtering to the calibration and alignment "
-    "of inertial navigation systems, IEEE Transactions on Automatic Control 36 (1991) 4"
-)
 
 ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
     "error-state": Estimator("error-state filter", (_LEFFERTS,), rig=True),
-    "mukf": Estimator("multiplicative sigma-point filter", (_JULIER, _CRASSIDIS), rig=True),
     "svd-qukf": Estimator("quaternion sigma-point filter", (_JULIER,)),
     "gimbal-ukf": Estimator("gimbal-angle sigma-point filter", (_JULIER,)),
     "map": Estimator("batch, largest posterior", rig=True),
-    "lm": Estimator("batch, Levenberg-Marquardt"),
-    "linear": Estimator("linear filter of misalignment angles", (_GREWAL,)),
 }

@@ -178,7 +178,7 @@ def campaign(
     assert (
         of_study.model
     )  # kept in the problem, so that the task is the same to the byte whenever it is asked for
-    one = partial(one_run, made, of_study, kind)
+    one = partial(_one_run, made, of_study, kind)
     sample = run(one, runs=runs, seed=seed, executor=executor or Threads(2), folder=folder, progress=progress)
     truth = settings.true_values
     assert truth is not None
@@ -195,12 +195,12 @@ def campaign(
         bound=bounds(made.motion, of_study, truth).u,
         nis=sample["nis"][sound],
         rows=float(sample["rows"][sound].mean()),
-        nis_expected=expected_nis(made, of_study, kind, float(sample["dims"][sound].mean())),
+        nis_expected=_expected_nis(made, of_study, kind, float(sample["dims"][sound].mean())),
         attempted=runs,
     )
 
 
-def expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKind, dims: float) -> float:
+def _expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKind, dims: float) -> float:
     """Expectation of the mean NIS of a filter whose rows have ``dims`` scalars, which is a little less than that.
 
     The truth is the same in all runs, and not drawn from the prior: the sum over a run is smaller by the number of
@@ -220,7 +220,7 @@ def expected_nis(experiment: Experiment, problem: FilterProblem, kind: FilterKin
     return float(dims - np.mean(floor) - learned / len(angles))
 
 
-def one_run(
+def _one_run(
     experiment: Experiment, problem: FilterProblem, kind: FilterKind, rng: np.random.Generator
 ) -> Mapping[str, Array | float]:
     """Simulate once, estimate, and compare with the truth; fields of `Campaign` by name."""

@@ -41,7 +41,7 @@ class Chain(NamedTuple):
 
 
 @inlined
-def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
+def _eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
     """Eliminate the first ``count`` unknowns from H x = g, in place; ``gone`` is used up. Of H only the upper triangle
     is used."""
     n = len(g)
@@ -56,7 +56,7 @@ def eliminate(H: Array, g: Array, count: int, gone: Array) -> None:
 
 
 @inlined
-def add_interval(
+def _add_interval(
     F: Array, G: Array, e: Array, W: Array, H: Array, g: Array, row: Array, weighted: Array
 ) -> None:
     """Add the rows of an interval, ``F`` (m, m), ``G`` (m, p), ``e`` (m,), ``W`` (m, m), to H and g."""
@@ -84,7 +84,7 @@ def add_interval(
 
 
 @inlined
-def add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, H: Array, g: Array) -> None:
+def _add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, H: Array, g: Array) -> None:
     """Add the rows of a node to H and g, of its velocity ``v`` (3,) and its ``angles`` (3,), each with its
     information."""
     for i in range(3):
@@ -99,7 +99,7 @@ def add_node(v: Array, velocity: float, angles: Array, attitude: float, m: int, 
 
 
 @inlined
-def cleared(H: Array, g: Array, begin: int, end: int) -> None:
+def _cleared(H: Array, g: Array, begin: int, end: int) -> None:
     """Forget what H and g say of the unknowns from ``begin`` to below ``end``."""
     for i in range(begin, end):
         g[i] = 0.0
@@ -108,11 +108,11 @@ def cleared(H: Array, g: Array, begin: int, end: int) -> None:
 
 
 @inlined
-def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
+def _moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
     """Put the next node in the place of the one that was eliminated, with its angles where the rest ``ends``."""
     n, by = len(g), m + 3
     if ends:
-        cleared(H, g, m, by)
+        _cleared(H, g, m, by)
     for i in range(m):
         for j in range(i, m):
             H[i, j] = H[by + i, by + j]
@@ -121,7 +121,7 @@ def moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
         for j in range(2 * m + 3, n):
             H[i, j] = H[by + i, j]
         g[i] = g[by + i]
-    cleared(H, g, by, by + m)
+    _cleared(H, g, by, by + m)
 
 
 @inlined
@@ -152,11 +152,11 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
     """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
     (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
     m, n = chain.F.shape[1], len(g)
-    eliminate_all(chain, H, g, rows, right, np.empty(n), np.empty((m, n)), np.empty((m, n)))
+    _eliminate_all(chain, H, g, rows, right, np.empty(n), np.empty((m, n)), np.empty((m, n)))
 
 
 @kernel
-def eliminate_all(
+def _eliminate_all(
     chain: Chain, H: Array, g: Array, rows: Array, right: Array, gone: Array, row: Array, weighted: Array
 ) -> None:
     """Eliminate all nodes as in `forward`; ``gone`` (n,), ``row`` and ``weighted`` (m, n) are used up."""
@@ -164,24 +164,24 @@ def eliminate_all(
     begun(chain.start, chain.begin, chain.prior, chain.c, H, g)
     for k in range(count):
         ends = k == count - 1 or chain.rest[k + 1] != chain.rest[k]
-        add_node(chain.v[k], chain.velocity, chain.angles[k], chain.attitude, m, H, g)
+        _add_node(chain.v[k], chain.velocity, chain.angles[k], chain.attitude, m, H, g)
         for i in range(n):
             gone[i] = 0.0
         if k < count - 1:
-            add_interval(chain.F[k], chain.G[k], chain.e[k], chain.W[k], H, g, row, weighted)
-        eliminate(H, g, m + 3 if ends and chain.attitude > 0.0 else m, gone)
+            _add_interval(chain.F[k], chain.G[k], chain.e[k], chain.W[k], H, g, row, weighted)
+        _eliminate(H, g, m + 3 if ends and chain.attitude > 0.0 else m, gone)
         kept(H, g, rows[k], right[k])
-        moved_on(H, g, m, ends)
+        _moved_on(H, g, m, ends)
 
 
 def backward(rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array) -> None:
     """Errors ``x`` (k + 1, m) of the nodes, and ``angles`` (k + 1, 3) of the references, of those of the coefficients
     ``c`` (p,)."""
-    put_back(rest, rows, right, c, x, angles, np.empty(rows.shape[2]))
+    _put_back(rest, rows, right, c, x, angles, np.empty(rows.shape[2]))
 
 
 @kernel
-def put_back(
+def _put_back(
     rest: NDArray[np.int64], rows: Array, right: Array, c: Array, x: Array, angles: Array, z: Array
 ) -> None:
     """Put errors back into the rows as in `backward`; ``z`` (n,) is used up."""
@@ -210,7 +210,7 @@ def put_back(
 
 
 @inlined
-def completed(row: Array, i: int, Z: Array) -> None:
+def _completed(row: Array, i: int, Z: Array) -> None:
     """Covariances ``Z`` (n, n) of unknown i with those behind it, of its ``row`` (n,) at elimination."""
     n = len(row)
     for j in range(i + 1, n):
@@ -268,7 +268,7 @@ def follow(
         ends = last or rest[k + 1] != rest[k]
         first = m + 2 if ends and held else m - 1
         for i in range(first, -1, -1):
-            completed(rows[k, i], i, Z)
+            _completed(rows[k, i], i, Z)
         if not last:
             explained(F[k], G[k], Z, row, out[k], coupled[k])
         for i in range(m + 3):

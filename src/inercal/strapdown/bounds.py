@@ -91,7 +91,7 @@ class Pieces:
         """Covariance (q, q) of the stated coefficients, of the information (m + p, m + p) at the end of a rest; NaN
         where it is lost in rounding."""
         try:
-            of_free = inverse(condensed(information, self.m), np.ones(len(self.free)))
+            of_free = inverse(_condensed(information, self.m), np.ones(len(self.free)))
         except np.linalg.LinAlgError:
             of_free = np.full((len(self.free), len(self.free)), np.nan)
         by = self.slope * self.prior
@@ -105,7 +105,7 @@ class Pieces:
             start_u(self.settings), variances_of(self.settings.noise), m
         )
         H[range(2 * m, len(H)), range(2 * m, len(H))] += 1.0
-        steps = [Step(condensed(H, m), C)]
+        steps = [Step(_condensed(H, m), C)]
         for axis, angle in turns:
             steps.append(self.after(steps[-1], axis, angle, times))
         return steps
@@ -118,7 +118,7 @@ class Pieces:
         H[:m, 2 * m :] += J[:m, m:]
         H[2 * m :, :m] += J[m:, :m]
         H[2 * m :, 2 * m :] += J[m:, m:]
-        return Step(condensed(H, m), step.C_nb @ elementary(AXES[axis], angle))
+        return Step(_condensed(H, m), step.C_nb @ elementary(AXES[axis], angle))
 
     def _leg(self, C: Array, axis: int, angle: float, times: Times) -> Array:
         """Information (2 m + p, 2 m + p) of a turn from the attitude ``C`` (3, 3) and the rest after it."""
@@ -160,7 +160,7 @@ class Pieces:
             held = rests.attitude is not None
             order = np.concatenate([angles, others])
             self._kept[key] = (
-                condensed(whole[np.ix_(order, order)], 3) if held else whole[np.ix_(others, others)]
+                _condensed(whole[np.ix_(order, order)], 3) if held else whole[np.ix_(others, others)]
             )
         return self._kept[key]
 
@@ -203,7 +203,7 @@ def _know(H: Array, at: int, angles: int, velocity: float, attitude: float) -> N
         H[b, a] -= attitude
 
 
-def condensed(H: Array, count: int) -> Array:
+def _condensed(H: Array, count: int) -> Array:
     """Information without the first ``count`` unknowns, which are eliminated."""
     right = H[:count, count:]
     return np.asarray(H[count:, count:] - right.T @ np.linalg.solve(H[:count, :count], right))
@@ -218,7 +218,7 @@ def joined(first: Array, second: Array, m: int) -> Array:
     two = np.r_[0:m, 2 * m : 3 * m, 3 * m : n + m]
     H[np.ix_(one, one)] += first
     H[np.ix_(two, two)] += second
-    return condensed(H, m)
+    return _condensed(H, m)
 
 
 def _repeated(piece: Array, number: int, m: int) -> Array:
@@ -230,7 +230,7 @@ def _repeated(piece: Array, number: int, m: int) -> Array:
     return joined(twice, piece, m) if number % 2 else twice
 
 
-def times_of(plan: Plan) -> Times:
+def _times_of(plan: Plan) -> Times:
     """Times of a plan."""
     return Times(plan.turn_time, plan.dwell, plan.first_dwell)
 
@@ -238,7 +238,7 @@ def times_of(plan: Plan) -> Times:
 def bounds(pieces: Pieces, plan: Plan) -> PlanBounds:
     """Bounds along a plan, and after each of its rests."""
     settings = pieces.settings
-    steps = pieces.steps(start_attitude(plan), plan.turns, times_of(plan))
+    steps = pieces.steps(start_attitude(plan), plan.turns, _times_of(plan))
     covariances = [pieces.covariance(each.information) for each in steps]
     return PlanBounds(
         names(settings.terms, settings.frame),

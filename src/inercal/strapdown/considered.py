@@ -23,7 +23,7 @@ from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.settings import StrapdownSettings
 from inercal.units import STANDARD_GRAVITY
 
-TERM = "g_sensitivity"
+_TERM = "g_sensitivity"
 
 
 class Considered(NamedTuple):
@@ -36,10 +36,10 @@ class Considered(NamedTuple):
     finding: Finding | None
 
 
-def usual_size(settings: StrapdownSettings) -> float:
+def _usual_size(settings: StrapdownSettings) -> float:
     """Usual size of drifts by specific force [(rad/s)/(m/s^2)]: that of the study's prior, where it states one, else a
     part of the gyros' biases for each g."""
-    if TERM in settings.given.get("prior", {}):
+    if _TERM in settings.given.get("prior", {}):
         return float(settings.prior.g_sensitivity)
     return float(LIMITS.usual_drift * settings.prior.gyro_bias / STANDARD_GRAVITY)
 
@@ -51,10 +51,10 @@ def considered(
 
     ``slope`` (q, p) is of the results ``found`` by the coefficients of the fit, ``u`` (q,) theirs without the drifts.
     """
-    each = next((each for each in tested if each.candidate.name == TERM), None)
+    each = next((each for each in tested if each.candidate.name == _TERM), None)
     if each is None:
         return None
-    size, usual = float(each.candidate.prior[0]), usual_size(settings)
+    size, usual = float(each.candidate.prior[0]), _usual_size(settings)
     moment = second_moment(each.score, each.information - np.eye(len(each.score)), usual / size)
     left = math.sqrt(np.trace(moment) / len(moment))
     eigenvalues, axes = np.linalg.eigh(moment)
@@ -72,12 +72,12 @@ def _told(settings: StrapdownSettings, left: float, usual: float, names: list[st
     per_g = 3600.0 * math.degrees(STANDARD_GRAVITY)
     whence = (
         "as prior.g_sensitivity states"
-        if TERM in settings.given.get("prior", {})
+        if _TERM in settings.given.get("prior", {})
         else f"usual, {LIMITS.usual_drift:.2g} of prior.gyro_bias for each g"
     )
     return Finding(
         "considered",
         f"drifts of the gyros by specific force are not fitted, and count in u of {counted_names(names, 6)}: this "
         f"recording leaves {per_g * left:.2g} deg/h/g of them ({per_g * usual:.2g} deg/h/g {whence}); state "
-        f'prior.g_sensitivity if they are smaller, or add "{TERM}" to terms',
+        f'prior.g_sensitivity if they are smaller, or add "{_TERM}" to terms',
     )

@@ -30,10 +30,10 @@ REFERENCES: Final = (
     "V. V. Fedorov, Theory of Optimal Experiments, Academic Press (1972): exchange",
 )
 
-QUARTER: Final = 0.5 * math.pi
+_QUARTER: Final = 0.5 * math.pi
 
 NINETEEN: Final = tuple(
-    ("xyz".index(turn[-1]), -QUARTER if turn[0] == "-" else QUARTER)
+    ("xyz".index(turn[-1]), -_QUARTER if turn[0] == "-" else _QUARTER)
     for turn in [
         "y",
         "y",
@@ -57,7 +57,7 @@ NINETEEN: Final = tuple(
 )
 """Turns of the path of 19 positions, which begins with pitch 0, roll -90 deg."""
 
-_NINETEEN_START = (0.0, -QUARTER, 0.0)
+_NINETEEN_START = (0.0, -_QUARTER, 0.0)
 
 _TOLD = 3
 """Coefficients that the table names beside a turn."""
@@ -144,9 +144,9 @@ def design(
     goal = _goal(settings, _sound(bounds(pieces, of_nineteen)))
     plans, tried = dict[str, Plan](), 0
     if asked is not None:
-        ground = ground_of(pieces, given, goal)
+        ground = _ground_of(pieces, given, goal)
         path, tried = search(ground, np.random.default_rng(asked.seed), progress)
-        plans["found"] = plan_of(ground, path, given)
+        plans["found"] = _plan_of(ground, path, given)
     if given.turns:
         plans["study"] = given
     time = next(iter(plans.values())).duration
@@ -176,11 +176,11 @@ def _sound(along: PlanBounds) -> PlanBounds:
     return along
 
 
-def ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
+def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
     """The ground of a study's search; ``goal`` (q,). Raises `StudyError` where the turns leave no time for rests."""
     asked = pieces.settings.design
     assert asked is not None
-    angles = sorted(asked.angles or (QUARTER, 2.0 * QUARTER))
+    angles = sorted(asked.angles or (_QUARTER, 2.0 * _QUARTER))
     moves = tuple((axis, sign * angle) for axis in range(3) for angle in angles for sign in (1.0, -1.0))
     starts = attitudes(given) if asked.start == "free" else (start_attitude(given),)
     least = given.time_of(angles[0])
@@ -196,7 +196,7 @@ def ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
     return ground
 
 
-def plan_of(ground: Ground, path: Path, given: Plan) -> Plan:
+def _plan_of(ground: Ground, path: Path, given: Plan) -> Plan:
     """A path as a plan."""
     start, turns = path
     return replace(given, turns=turns, start=angles_of(ground.starts[start]), dwell=ground.times(turns).dwell)

@@ -21,7 +21,7 @@ from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.strapdown.coefficients import SIZE
 
-SUMS = 27
+_SUMS = 27
 """Sums over a block: w (3), |w| (3), f (3), fs (3), fs^2 (3), W (9), w x f (3), each times the interval."""
 
 Whole: TypeAlias = NDArray[np.int64]
@@ -168,7 +168,7 @@ def turned(turn: Array, sample: Whole, q: Array) -> None:
 
 
 @inlined
-def add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
+def _add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
     """Add a sample to the sums of a block."""
     w, fs = motion.w[k], motion.fs[k]
     f = (motion.f[k, 0], motion.f[k, 1], motion.f[k, 2])
@@ -239,7 +239,7 @@ def product(F: Array, X: Array, out: Array) -> None:
 
 
 @inlined
-def gathered(F: Array, S: Array, G: Array, out: Array) -> None:
+def _gathered(F: Array, S: Array, G: Array, out: Array) -> None:
     """``G`` (6, 51) becomes F G + S, S acting through the block: its errors of attitude by half on velocity."""
     for j in range(G.shape[1]):
         for i in range(6):
@@ -255,7 +255,7 @@ def gathered(F: Array, S: Array, G: Array, out: Array) -> None:
 
 
 @inlined
-def noise_added(F: Array, variances: Array, dt: float, Q: Array) -> None:
+def _noise_added(F: Array, variances: Array, dt: float, Q: Array) -> None:
     """Add to ``Q`` (m, m) what white noise and walks of ``variances`` (4,) [per s] gain in a block."""
     for i in range(3):
         Q[i, i] += variances[0] * dt
@@ -330,15 +330,15 @@ def shoot(
         np.empty((3, 3)),
         np.eye(m),
         np.zeros((6, SIZE)),
-        np.empty(SUMS),
+        np.empty(_SUMS),
         np.empty((6, m)),
         np.empty((6, SIZE)),
     )
-    shots(motion, cuts, first, state._replace(bias=off), c.gyro, c.accelerometer, world, noise, shot, room)
+    _shots(motion, cuts, first, state._replace(bias=off), c.gyro, c.accelerometer, world, noise, shot, room)
 
 
 @kernel
-def shots(
+def _shots(
     motion: Motion, cuts: Whole, first: Whole, state: State, of_gyros: Array, of_accs: Array, world: World,
     noise: Array, shot: Shot, room: Room,
 ) -> None:  # fmt: skip
@@ -350,11 +350,11 @@ def shots(
         drift = (state.bias[node, 0], state.bias[node, 1], state.bias[node, 2])
         bias = (state.bias[node, 3], state.bias[node, 4], state.bias[node, 5])
         for block in range(first[node], first[node + 1]):
-            for i in range(SUMS):
+            for i in range(_SUMS):
                 sums[i] = 0.0
             before, dt = q, (cuts[block + 1] - cuts[block]) * world.ts
             for k in range(cuts[block], cuts[block + 1]):
-                add_sample(motion, k, world.ts, sums)
+                _add_sample(motion, k, world.ts, sums)
                 turn, gain = without(motion.turn[k], drift, world.ts), without(motion.gain[k], bias, world.ts)
                 q, v = carried(q, v, turn, gain, world)
             middle = normalize((before[0] + q[0], before[1] + q[1], before[2] + q[2], before[3] + q[3]))
@@ -369,8 +369,8 @@ def shots(
                             F[3 + i, 0] * S[0, j] + F[3 + i, 1] * S[1, j] + F[3 + i, 2] * S[2, j]
                         )
             product(F, shot.F[node], room.square)
-            gathered(F, S, shot.G[node], room.wide)
+            _gathered(F, S, shot.G[node], room.wide)
             spread(F, shot.Q[node], room.square)
-            noise_added(F, noise, dt, shot.Q[node])
+            _noise_added(F, noise, dt, shot.Q[node])
         shot.q[node, 0], shot.q[node, 1], shot.q[node, 2], shot.q[node, 3] = q
         shot.v[node, 0], shot.v[node, 1], shot.v[node, 2] = v

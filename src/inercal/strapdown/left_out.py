@@ -73,7 +73,7 @@ class Tested(NamedTuple):
 DRIFT = "bias_drift"
 """Code of biases that drift in proportion to time."""
 
-RAMP = "_ramp"
+_RAMP = "_ramp"
 """End of the name of such a drift, after that of the sensor."""
 
 
@@ -107,7 +107,7 @@ def _drift(sensors: tuple[str, ...], columns: Array, prior: Array) -> Candidate:
     whose = " and ".join(f"of the {each}s" for each in sensors)
     walks = " and ".join(f"noise.{each}_walk" for each in sensors)
     return Candidate(
-        f"{'_and_'.join(sensors)}{RAMP}",
+        f"{'_and_'.join(sensors)}{_RAMP}",
         DRIFT,
         f"biases {whose} that drift over the recording",
         f"let the unit warm up, or state {walks}",
@@ -182,7 +182,7 @@ def drifts(problem: Posed, noise: Noise) -> list[Tested]:
     """Drifts of biases that a recording shows, of the sensors whose biases may walk by this noise (`told_apart`)."""
     walking = {"gyro": noise.gyro_walk > 0.0, "accelerometer": noise.accelerometer_walk > 0.0}
     sensors = {
-        number: each.name.removesuffix(RAMP)
+        number: each.name.removesuffix(_RAMP)
         for number, each in enumerate(problem.candidates)
         if each.code == DRIFT
     }

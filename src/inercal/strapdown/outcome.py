@@ -34,7 +34,7 @@ from inercal.strapdown.settings import TURN_NOISE, StrapdownSettings
 
 COMMAND = "calibrate strapdown"
 
-FRAMES = {
+_FRAMES = {
     "upper": "b, of the instrument: z along the input axis of accelerometer z, y in the plane of those of y and z; "
     "origin at accelerometer z",
     "lower": "b, of the instrument: x along the input axis of accelerometer x, y in the plane of those of x and y; "
@@ -274,7 +274,7 @@ def _conditions(record: Record, samples: Samples, fit: Fit, settings: StrapdownS
         "duration_s": len(samples.rate) * samples.ts,
         "rate_hz": 1.0 / samples.ts,
     }
-    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAMES[settings.frame])
+    return conditions_of(settings, recorded_temperature(record), ranges, frame=_FRAMES[settings.frame])
 
 
 def _too_quiet(fit: Fit) -> list[Finding]:

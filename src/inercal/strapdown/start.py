@@ -33,7 +33,7 @@ def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Begi
     force, rate = (np.mean(x[nodes.sample[0] : last], axis=0) for x in (motion.f, motion.w))
     up = force / np.linalg.norm(force)
     u, east = start_u(settings), np.cross(rate, up)
-    if by_compass(settings) and np.linalg.norm(east) > 0.0:
+    if _by_compass(settings) and np.linalg.norm(east) > 0.0:
         east /= np.linalg.norm(east)
         return Beginning(from_matrix(np.stack([east, np.cross(up, east), up])), u)
     # the axis of b that is nearest to level points north, then turned by the heading
@@ -45,7 +45,7 @@ def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Begi
     return Beginning(multiply(exp(heading), level), u)
 
 
-def by_compass(settings: StrapdownSettings) -> bool:
+def _by_compass(settings: StrapdownSettings) -> bool:
     """True where the heading at the start is found from earth rate."""
     compass = settings.start.compass
     if compass is None:
@@ -59,7 +59,7 @@ def start_u(settings: StrapdownSettings) -> Array:
     accelerometers whose biases are not known yet."""
     start = settings.start
     tilt = math.hypot(LIMITS.start_tilt, settings.prior.bias / STANDARD_GRAVITY)
-    return np.array([tilt, tilt, LIMITS.start_heading if by_compass(settings) else start.heading_u])
+    return np.array([tilt, tilt, LIMITS.start_heading if _by_compass(settings) else start.heading_u])
 
 
 def first_coefficients(samples: Samples, nodes: Nodes) -> Array:

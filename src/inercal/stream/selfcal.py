@@ -190,7 +190,7 @@ class Selfcal:
         kept = state.kept.after(step, doubt, walk)
         estimate: History | Estimates = trace.estimates
         if kept.full:
-            filter_, kept = kept.passed(self._module, self._problem, filter_)
+            filter_, kept = kept.passed(self._problem, filter_)
             estimate = estimate_of(filter_, self._problem)
         if trace.restarts:
             text = "the platform did not turn on as before: its attitude is taken anew from the encoders"
@@ -336,7 +336,7 @@ def filter_of(problem: FilterProblem) -> ModuleType:
     if module is None:
         raise StudyError(
             "filter.kind",
-            f"found {problem.filter.kind}, which works on whole recordings, expected error-state, mukf, svd-qukf or "
+            f"found {problem.filter.kind}, which works on whole recordings, expected error-state, svd-qukf or "
             "gimbal-ukf for a stream",
         )
     if any(KIND_OF[name] in TEMPERATURE for name in problem.names):

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StrictInt, create_model
+from pydantic import Field, StrictInt, create_model, field_validator
 
 from inercal._toml import Strict, check
 from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.geometry.site import Site
+from inercal.selfcal.estimators import GONE
 from inercal.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
 from inercal.selfcal.platform.rig import Base
 from inercal.selfcal.platform.states import STATES
@@ -36,7 +37,7 @@ from inercal.studies.common import (
     Version,
     site_on_earth,
 )
-from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive
+from inercal.studies.fields import QuantityText, Several, SeveralTexts, positive, refusal
 from inercal.studies.laboratory import (
     Equipment,
     Item,
@@ -122,6 +123,16 @@ class GoalTable(_WANTED):  # type: ignore[misc]
 
 class FilterTable(table_of(Filter)):  # type: ignore[misc]
     """Choice and settings of the estimator."""
+
+    @field_validator("kind", mode="before")
+    @classmethod
+    def _still_there(cls, kind: object) -> object:
+        """Refuse an estimator of earlier versions, and say what serves instead."""
+        if isinstance(kind, str) and kind in GONE:
+            raise refusal(
+                f"found {kind!r}, which inercal no longer has, expected {GONE[kind]!r} in its place"
+            )
+        return kind
 
     gating: Literal["off", "any", "two", "channel"] = Field(
         default="off",

@@ -20,13 +20,13 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.turntable.weights import Weights, whitened
 
-STEPS = 60
+_STEPS = 60
 """Scoring steps at most; a dozen do unless a channel has no noise at all."""
 
-TINY = 1e-100
+_TINY = 1e-100
 """Least information about the logarithm of a variance."""
 
-LONGEST = 3.0
+_LONGEST = 3.0
 """Change of log s^2 in a step at most."""
 
 
@@ -71,7 +71,7 @@ def scatter(
     if not free.any():
         return ReadingNoise(np.exp(0.5 * start), dof, _likelihood(rows, y, table, np.exp(start)).value)
     log, now = start, _likelihood(rows, y, table, np.exp(start))
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         s2 = np.exp(log)
         slope, information = now.slope * s2, now.information * s2 * s2[:, None]
         moving = free & ~((log <= low) & (slope < 0.0))
@@ -79,7 +79,7 @@ def scatter(
             break
         step = np.zeros(len(log))
         step[moving] = np.linalg.lstsq(information[np.ix_(moving, moving)], slope[moving], rcond=None)[0]
-        step = np.clip(step, -LONGEST, LONGEST)
+        step = np.clip(step, -_LONGEST, _LONGEST)
         before = log
         while np.abs(step).max() > 1e-6:
             log = np.maximum(before + step, low)
@@ -93,7 +93,7 @@ def scatter(
     s2 = np.exp(log)[free]
     of_log = now.information[np.ix_(free, free)] * s2 * s2[:, None]
     # of a variance that is estimated as none the readings know next to nothing
-    size = np.sqrt(np.maximum(np.diag(of_log), TINY))
+    size = np.sqrt(np.maximum(np.diag(of_log), _TINY))
     dof[free] = 2.0 * np.square(size) / np.diag(np.linalg.pinv(of_log / np.outer(size, size)))
     return ReadingNoise(np.exp(0.5 * log), dof, now.value)
 

@@ -38,10 +38,10 @@ from inercal.turntable.weights import (
     whitened,
 )
 
-ROUNDS = 6
+_ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
 
-RUNAWAY = 1e3
+_RUNAWAY = 1e3
 """Growth of u in the last of these that says that they do not end: with the terms the weights of all readings sink."""
 
 FLOOR = 1e-12
@@ -289,7 +289,7 @@ def fit_to_order(
     plain = Weights(np.broadcast_to(np.eye(channels), (n, channels, channels)), np.zeros((n, channels, 0)))
     c = solve(rows, y, plain).c[:p] if start is None else start
     u, settled, bent, readings = np.zeros(p), True, None, y
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         if not np.isfinite(c).all():
             break
         table = weights(model, angles, c, np.zeros(channels), samples=samples)
@@ -305,7 +305,7 @@ def fit_to_order(
         if np.all(change <= 1e-3 * u):
             break
     else:
-        settled = bool((u <= RUNAWAY * before).all())
+        settled = bool((u <= _RUNAWAY * before).all())
     if not (
         settled and np.isfinite(c).all() and np.isfinite(solution.joint).all() and (noise_fit.dof > 0.0).all()
     ):

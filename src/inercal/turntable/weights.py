@@ -108,14 +108,14 @@ def weights_of(
     changes (n, c, b) by inputs beside it."""
     scaled = averaged(chain, slopes, samples) * (chain.std if std is None else std)
     constant = np.array([error.scope.constant for error in chain.errors], dtype=bool)
-    redrawn, by_angle = by_value(chain, scaled, angles)
+    redrawn, by_angle = _by_value(chain, scaled, angles)
     return Weights(
         np.einsum("nck,ndk->ncd", redrawn, redrawn) + np.diag(np.square(noise)),
         np.concatenate([scaled[..., constant], beside, by_angle], axis=-1),
     )
 
 
-def by_value(chain: Chain, scaled: Array, angles: Array) -> tuple[Array, Array]:
+def _by_value(chain: Chain, scaled: Array, angles: Array) -> tuple[Array, Array]:
     """Of changes (n, c, k) of the readings by the errors, those that are redrawn from value to value.
 
     Returns

@@ -224,7 +224,7 @@ def _evenly(
 
 
 @kernel
-def observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -> None:
+def _observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -> None:
     """Covariance ``P[0]`` and its parts ``P[1:]`` (m, m) after a scalar measurement, in place.
 
     ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
@@ -321,12 +321,12 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                     )
                     for i in range(3):
                         size = decorrelated_row(i, roots[i], columns, wide, row)
-                        observe(P, row, size, 1.0, _PARTS[1], work)
+                        _observe(P, row, size, 1.0, _PARTS[1], work)
                 sensed = sensing(at, read, earth_e, up_e, warm[k], c)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
                         size = accelerometer_row(i, sensed, c, place, up_e, row)
-                        observe(P, row, size, variance, _PARTS[0], work)
+                        _observe(P, row, size, variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(u.shape[1]):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -186,7 +186,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
         walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
         propagate_covariance(P, c, own, step, walk, top, columns)
         wander(P, mean, own, noise.gyro_walk, noise.accelerometer_walk, step.dt)
-        forget(S, own, step.dt)
+        _forget(S, own, step.dt)
         if measured[k, 3]:
             watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
         if updating(gate, near):
@@ -220,7 +220,7 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
 
 
 @kernel
-def forget(S: Array, place: Places, dt: float) -> None:
+def _forget(S: Array, place: Places, dt: float) -> None:
     """Let what errors of walking biases depend on fade within ``dt`` [s], as these do, in sensitivities ``S``."""
     keep = math.exp(-dt / WALK_TIME)
     for i in range(WALK, WALK + 6):

@@ -70,11 +70,11 @@ def short(case: Case) -> Case:
 def regular(recording: Recording, result: FilterResult) -> Array:
     """Normalised innovations (n - 1, 6), NaN near gimbal lock."""
     innovations = result.innovations.copy()
-    innovations[near_lock(recording)] = np.nan
+    innovations[_near_lock(recording)] = np.nan
     return innovations
 
 
-def near_lock(recording: Recording) -> NDArray[np.bool_]:
+def _near_lock(recording: Recording) -> NDArray[np.bool_]:
     """Steps (n - 1,) that end near gimbal lock."""
     angle = recording.th[1:, 1]
     return np.asarray(~(np.abs(np.cos(angle)) >= LIMITS.lock_cosine) & np.isfinite(angle))

@@ -55,7 +55,7 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
 def unsteady(case: Case, any_states: bool = True) -> Finding | None:
     """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
     other as possible too. States alone count with ``any_states`` only."""
-    noise, states = restless_gyros(case), needed_states(case)
+    noise, states = _restless_gyros(case), needed_states(case)
     found = [each for each in (noise, states if noise or any_states else None) if each]
     if not found:
         return None
@@ -112,7 +112,7 @@ def _even(columns: Array, mean: float) -> bool:
 
 
 @once
-def restless_gyros(case: Case) -> Explained | None:
+def _restless_gyros(case: Case) -> Explained | None:
     """Gyro noise other than stated that explains the innovations, if any."""
     case = short(case)
     for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):

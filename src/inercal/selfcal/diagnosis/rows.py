@@ -27,7 +27,7 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import JOINTS
 
-SHIFTS = tuple(by for by in range(-LIMITS.longest_shift, LIMITS.longest_shift + 1) if by)
+_SHIFTS = tuple(by for by in range(-LIMITS.longest_shift, LIMITS.longest_shift + 1) if by)
 """Rows by which a log may be shifted."""
 
 
@@ -125,17 +125,17 @@ def _shifts(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
         return np.asarray(np.nan_to_num(np.square(turn.seen - commanded).sum(axis=1)))
 
     plain = off(0)
-    by_shift = {shift: off(shift) for shift in SHIFTS}
-    whole = min(SHIFTS, key=lambda shift: by_shift[shift].sum())
-    yield _shifted(recording, whole, 0, len(SHIFTS))
+    by_shift = {shift: off(shift) for shift in _SHIFTS}
+    whole = min(_SHIFTS, key=lambda shift: by_shift[shift].sum())
+    yield _shifted(recording, whole, 0, len(_SHIFTS))
     # squares before a row without the shift, from it on with it
     gain = {shift: np.cumsum((plain - squares)[::-1])[::-1] for shift, squares in by_shift.items()}
-    part = max(SHIFTS, key=lambda shift: gain[shift].max())
+    part = max(_SHIFTS, key=lambda shift: gain[shift].max())
     # where rates are steady a shift hardly shows: the last row from which it may begin, and some before
     last = int(np.flatnonzero(gain[part] >= gain[part].max() - (LIMITS.noise_sigmas * turn.noise) ** 2)[-1])
     for first in last - np.append(0, 5 * 2 ** np.arange(10)):
         if first > 0:
-            yield _shifted(recording, part, int(first), len(SHIFTS) * n)
+            yield _shifted(recording, part, int(first), len(_SHIFTS) * n)
 
 
 def _shifted(recording: Recording, shift: int, first: int, alternatives: float) -> Hypothesis[Case]:
@@ -151,17 +151,17 @@ def _shifted(recording: Recording, shift: int, first: int, alternatives: float) 
 
 def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
     """Accelerometers logged some rows late or early: the shift that agrees best with the encoders."""
-    moved = {shift: _by_rows(recording.acc, shift) for shift in SHIFTS}
+    moved = {shift: _by_rows(recording.acc, shift) for shift in _SHIFTS}
 
     def off(shift: int) -> float:
         apart = moved[shift] - turn.up
         return float(np.nanmean(np.square(apart))) if np.isfinite(apart).any() else math.inf
 
-    shift = min(SHIFTS, key=off)
+    shift = min(_SHIFTS, key=off)
     how = "late" if shift > 0 else "early"
     text = f"accelerometers are logged {counted(abs(shift), 'row')} {how}, against angles and commands"
     left_out = int(np.isfinite(recording.acc).sum() - np.isfinite(moved[shift]).sum())
-    yield _fault("command_shift", text, replace(recording, acc=moved[shift]), len(SHIFTS), left_out)
+    yield _fault("command_shift", text, replace(recording, acc=moved[shift]), len(_SHIFTS), left_out)
 
 
 def _by_rows(values: Array, shift: int) -> Array:
@@ -250,7 +250,7 @@ def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Ca
     rows = np.flatnonzero(lost)
     # the time that they took, with the commands of the rows before them held
     t = recording.t + np.append(0.0, np.cumsum(np.where(lost, more * recording.dt, 0.0)))
-    alternatives = len(size) * len(SHIFTS)
+    alternatives = len(size) * len(_SHIFTS)
     text = f"about {counted(int(more[lost].sum()), 'row')} missing though time goes on: the angles leap along the turn"
     where = places("row", rows + 2)
     yield _fault("gap", text, replace(recording, t=t), alternatives, times=len(rows), where=where)

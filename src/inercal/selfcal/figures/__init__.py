@@ -45,9 +45,6 @@ if TYPE_CHECKING:
     from inercal.selfcal.task import Calibration
 
 
-_AT_ONCE = ("map", "lm")
-"""Estimators that know all at once: their coefficients have no course over time."""
-
 _OF_THE_PAPER = ("svd-qukf", "gimbal-ukf")
 
 _CHANNELS = ("acc x", "acc y", "acc z")
@@ -74,13 +71,13 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
     filtered, estimate = calibration.filtered, calibration.estimate.shown()
     t, history = calibration.recording.t, filtered.history
     drawings = [_bounds(calibration)] if estimate.names else []
-    if history is not None and filtered.kind not in _AT_ONCE:
+    if history is not None and filtered.kind != "map":
         drawings += convergence(calibration)
     drawings += [_path(calibration), gimbals_on_base(calibration.settings.base, calibration.settings.gimbals)]
     if history is not None:
         true = calibration.recording.reference if attitude is None else attitude
         drawings += _attitude(calibration, history, true)
-        if filtered.kind not in _AT_ONCE:
+        if filtered.kind != "map":
             drawings.append(relative_errors(t, history, calibration.truth))
     drawings.append(nis(t[1:], filtered.nis, filtered.dims))
     if len(filtered.innovations):
@@ -89,7 +86,7 @@ def pictures(calibration: Calibration, attitude: Array | None = None) -> list[Pi
     if estimate.names:
         drawings.append(correlation(estimate))
         drawings += [budget(estimate)] if estimate.budget else []
-    return drawings + compare_pictures(calibration)
+    return drawings + _compare_pictures(calibration)
 
 
 def _path(calibration: Calibration) -> Picture:
@@ -98,7 +95,7 @@ def _path(calibration: Calibration) -> Picture:
     return path_of(recording.t, recording.th, "The path", "Gimbal angles that the encoders read")
 
 
-def compare_pictures(calibration: Calibration) -> list[Picture]:
+def _compare_pictures(calibration: Calibration) -> list[Picture]:
     """Distance of the other filters from the one that counts; no picture without others."""
     filters = _all(calibration)
     if len(filters) < 2:

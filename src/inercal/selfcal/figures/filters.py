@@ -175,9 +175,7 @@ def filters_apart(names: Sequence[str], apart: Mapping[str, Array], first: str) 
     return draw(
         "Filters against each other",
         f"Estimate of each filter less that of {first}, over the standard uncertainty of {first}; logarithmic beyond "
-        f"± {linear:g}. Band: ± 1. All have the same data: good approximations lie close together; lm, which "
-        "leaves the noise of the gyros out of its fit, is a start for others and lies up to some u away, and so may "
-        "linear, which is linearised once, about the commanded path.",
+        f"± {linear:g}. Band: ± 1. All have the same data: good approximations lie close together.",
         [[Panel(marks, across, Axis(names=names), grid="both")]],
         0.8 + 0.17 * len(names),
         6,

@@ -35,8 +35,8 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
     )
     what = "attitude and coefficients" if m > p else "coefficients"
     pictures = [
-        covered(coverage, campaign.names, campaign.rms_over_bound),
-        chi_square(
+        _covered(coverage, campaign.names, campaign.rms_over_bound),
+        _chi_square(
             "Normalised estimation error squared",
             f"Errors of {what} of a run together, {m} numbers, squared and over their stated covariance (NEES), beside "
             f"the chi-square density that they follow if the covariances are true. Mean {nees.mean:.3g} of {nees.runs} "
@@ -46,7 +46,7 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
             1.0,
             "NEES",
         ),
-        chi_square(
+        _chi_square(
             "Normalised innovations squared",
             f"Mean over the {campaign.rows:.0f} rows of each run away from gimbal lock (NIS), beside the density of "
             f"such a mean. Mean {np.nanmean(campaign.nis):.4f}, expected {campaign.nis_limits[0]:.4f} to "
@@ -68,7 +68,7 @@ def page(campaign: Campaign, settings: SelfcalSettings, estimate: Estimate) -> s
     )
 
 
-def chi_square(title: str, caption: str, values: Array, dof: float, divisor: float, label: str) -> Picture:
+def _chi_square(title: str, caption: str, values: Array, dof: float, divisor: float, label: str) -> Picture:
     """Histogram of ``values`` (runs,) beside the density of chi-square with ``dof`` degrees of freedom, over
     ``divisor``."""
     from scipy.stats import chi2  # takes long to import
@@ -90,7 +90,7 @@ def chi_square(title: str, caption: str, values: Array, dof: float, divisor: flo
     return draw(title, caption + more, [[Panel(marks, *axes)]], 2.4)
 
 
-def covered(coverage: Coverage, names: Sequence[str], over_bound: Array) -> Picture:
+def _covered(coverage: Coverage, names: Sequence[str], over_bound: Array) -> Picture:
     """Share of stated intervals that held the truth, and root mean square errors over stated uncertainties and over
     bounds (p,)."""
     rows, (low, high) = np.arange(len(names)), coverage.limits

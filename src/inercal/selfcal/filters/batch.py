@@ -1,4 +1,4 @@
-"""Estimator 5, all at once: the most probable attitudes and coefficients, by Gauss-Newton on a banded system.
+"""The batch estimator: the most probable attitudes and coefficients, by Gauss-Newton on a banded system.
 
 Unknowns are the attitude at every row and the coefficients (linear form). Each term of the sum of squares is whitened:
 
@@ -50,18 +50,16 @@ from inercal.selfcal.filters.residuals import (
     turns,
     turns_on_rig,
 )
-from inercal.selfcal.filters.start import rough_path
-from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import TAU
 
-BAND = 5
+_BAND = 5
 """Entries below the diagonal that the attitudes' normal matrix has."""
 
-STEP = 1e-6
+_STEP = 1e-6
 """Size of the last step, over the standard uncertainties of the coefficients, at which the iteration ends."""
 
-ITERATIONS = 30
+_ITERATIONS = 30
 
 
 def estimate_map(
@@ -70,7 +68,8 @@ def estimate_map(
     """Maximum a posteriori over all attitudes and coefficients; measurements missing or stopped by the gate left out.
 
     ``start`` is that of the first attitude, its encoder reading if absent; the iteration begins at the encoders all the
-    same, or where these never read at the estimate of ``lm``. With ``history`` attitudes are given all measurements.
+    same, so that a start may be off by any angle, and only where these never read at the commanded path from the start.
+    With ``history`` attitudes are given all measurements.
 
     ``nis`` of a row: squared normalised residuals of its measurements and of the steps since the row measured before,
     and an equal share of those of the prior. Their sum over all rows is the minimum, chi-square with as many degrees of
@@ -85,46 +84,35 @@ def estimate_map(
     inverse_diagonal(np.ones((2, 2), order="F"), np.empty(2))
     began = time.perf_counter()
     measured, loose = readings(recording, problem), broken(recording, problem, start)
-    q, c = _first_guess(recording, problem, measured, start)
-    c = c + problem.mean
+    q, c = _first_guess(recording, problem, measured, start), problem.mean
     p = len(c)
-    message = f"the iteration did not end in {ITERATIONS} steps, so far is the recording from the model"
+    message = f"the iteration did not end in {_ITERATIONS} steps, so far is the recording from the model"
     covariance, u = np.full((p, p), np.nan), np.full((len(q), 3), np.nan)
-    for _ in range(ITERATIONS):
+    for _ in range(_ITERATIONS):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # lost numbers are refused below
-                terms = terms_at(q, c, recording, problem, measured, first, loose, of_encoders)
+                terms = _terms_at(q, c, recording, problem, measured, first, loose, of_encoders)
                 step = _step(terms, history)
         except (np.linalg.LinAlgError, ValueError):
             message = "the iteration diverged: the normal equations are not positive definite"
             break
         covariance, u = step.covariance, step.attitude_u
         q, c = normalize(boxplus(q, step.attitudes)), c + problem.prior * step.coefficients
-        if np.max(np.abs(step.coefficients) / np.sqrt(np.diag(covariance))) < STEP:
+        if np.max(np.abs(step.coefficients) / np.sqrt(np.diag(covariance))) < _STEP:
             message = ""
             break
     covariance = covariance * np.outer(problem.prior, problem.prior)
     innovations = normalised(terms.sensed.residual, measured) if history else None
     nis = _per_row(terms, measured)
-    result = batch_result(
-        "map", recording, problem, measured, (q, u), (c, covariance), nis, innovations, message
-    )
+    result = batch_result(recording, problem, measured, (q, u), (c, covariance), nis, innovations, message)
     return replace(result, seconds=time.perf_counter() - began, restarts=tuple(k + 1 for k in loose))
 
 
 def _first_guess(
     recording: Recording, problem: FilterProblem, measured: Measurements, start: Start | None
-) -> tuple[Array, Array]:
-    """Attitudes (n, 4) and coefficients (p,) to begin with: the encoders', carried by the commands where silent."""
+) -> Array:
+    """Attitudes (n, 4) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
-    if start is not None and not seen.any():
-        of_paper = replace(problem, prior=problem.prior[: len(NAMES)], vector=None)
-        q, c = (
-            rough_path(recording, of_paper, start)
-            if problem.states.of_rig
-            else rough_path(recording, problem, start)
-        )
-        return q, np.append(c, np.zeros(len(problem.prior) - len(c))) - problem.mean
     first = first_reading(recording, problem).attitude if start is None else start.attitude
     attitudes = np.vstack([first, measured.attitude])
     path = followed(first, recording.rate * recording.dt[:, None])
@@ -133,7 +121,7 @@ def _first_guess(
     since = recording.t - recording.t[last]
     turned = multiply(exp(-since[:, None] * problem.world.earth), attitudes[last])
     carried = multiply(turned, multiply(conjugate(path[last]), path))
-    return normalize(carried), np.zeros(len(problem.prior))
+    return normalize(carried)
 
 
 class _Terms(NamedTuple):
@@ -152,7 +140,7 @@ class _Terms(NamedTuple):
     prior: Array
 
 
-def terms_at(
+def _terms_at(
     q: Array,
     c: Array,
     recording: Recording,
@@ -241,7 +229,7 @@ def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     of_sensed = np.concatenate([of_rows.residual[:, :, None], of_rows.by_coefficients], axis=2)
     right[1:] += seen @ of_sensed + following @ of_process
     right[:-1] += last @ of_process
-    band = np.zeros((BAND + 1, 3 * n))
+    band = np.zeros((_BAND + 1, 3 * n))
     for j in range(3):
         for i in range(3):
             if i >= j:

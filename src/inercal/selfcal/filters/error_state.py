@@ -1,4 +1,4 @@
-"""Estimator 4, the product's default: an error-state filter with analytic Jacobians.
+"""The product's default: an error-state filter with analytic Jacobians.
 
 The attitude is a quaternion, its error a rotation vector in p (`inercal.selfcal.platform.linearised`); each step is
 exact for a rate held over it. The encoders come first, three decorrelated scalars, their residual linear in any error
@@ -101,7 +101,7 @@ def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = 
 
 
 @kernel
-def corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
+def _corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
     """The attitude with the error state ``x`` put in, and the states of the full vector ``c`` too, at their places
     ``index`` (p,); x is then 0."""
     for j in range(len(index)):
@@ -112,7 +112,7 @@ def corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
 
 
 @kernel
-def undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> float:
+def _undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> float:
     """Variance [rad^2] of the angle turned while it is not known on which side of a row a sensor, 0 encoders or 1
     accelerometers, was read where the rate changes: its delay may be of either sign."""
     at, lag = place[TAU + sensor], c[TAU + sensor]
@@ -127,7 +127,7 @@ def undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> fl
 
 
 @kernel
-def shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
+def _shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
     """Variance [m^2/s^4] of accelerometers away from the centre at a row where the rate changes, within the step of
     ``dt`` [s] before or after: as large as the angular acceleration makes it at the places that they have."""
     square = 0.0
@@ -144,7 +144,7 @@ def shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
 
 
 @kernel
-def encoder_update(
+def _encoder_update(
     q: Quaternion,
     of_encoders: Quaternion,
     angles: Array,
@@ -232,9 +232,9 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                     angles, of_encoders, read, earth_e, up_e, c, layout, axes, signs, columns
                 )
             if late:
-                sigma = math.sqrt(noise.encoder * noise.encoder + undecided(P, c, place, 0, read))
+                sigma = math.sqrt(noise.encoder * noise.encoder + _undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted
-            total += encoder_update(
+            total += _encoder_update(
                 q,
                 of_encoders,
                 angles,
@@ -252,7 +252,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 shown,
             )
             count += 3
-            q = corrected(q, c, index, x)
+            q = _corrected(q, c, index, x)
         if take:
             up_e = on_the_base(world.up, c)
             if rig:
@@ -261,11 +261,11 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             expected = outputs(sensed, c)
             if late:
                 a = sensed.force
-                of_acc = variance + undecided(P, c, place, 1, read) * (
+                of_acc = variance + _undecided(P, c, place, 1, read) * (
                     a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
                 )
             if levers:
-                of_acc = (of_acc if late else variance) + shaken(P, c, place, read, dt)
+                of_acc = (of_acc if late else variance) + _shaken(P, c, place, read, dt)
             for i in range(3):
                 if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
@@ -276,7 +276,7 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                     size = accelerometer_row(i, sensed, c, place, up_e, row)
                     total += scalar_update(P, x, row, size, acc[k, i] - expected[i], of_acc, work)
                     count += 1
-            q = corrected(q, c, index, x)
+            q = _corrected(q, c, index, x)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:

@@ -92,7 +92,7 @@ class History:
 
     ``attitude`` (n, 4) q_bp and its standard deviations ``attitude_u`` (n, 3) [rad, about the axes of p; of the gimbal
     angles for the gimbal-ukf]; ``coefficients`` (n, p), linear form, and their ``u`` (n, p). Row k holds what is known
-    with the measurements up to k; of ``map`` and ``lm``, which know all at once, the coefficients are those at the end.
+    with the measurements up to k; of ``map``, which knows all at once, the coefficients are those at the end.
     """
 
     attitude: Array
@@ -128,7 +128,7 @@ class FilterResult:
 
     ``coefficients`` (p,) by ``names``, linear form, their ``covariance`` (p, p); ``attitude`` (4,) q_bp at the
     last row. ``nis`` (n - 1,) normalised innovation squared of each row but the first, NaN where nothing was measured,
-    of ``dims`` (n - 1,) scalars; of ``map`` and ``lm`` squared normalised residuals. ``innovations`` (n - 1, 6) of
+    of ``dims`` (n - 1,) scalars; of ``map`` squared normalised residuals. ``innovations`` (n - 1, 6) of
     accelerometers and of the attitude about the axes of p (gimbal angles for the gimbal-ukf), each over its standard
     deviation, NaN where not measured; no rows without a history. ``seconds`` of the computation alone, kernels loaded.
 

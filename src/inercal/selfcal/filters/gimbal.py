@@ -1,4 +1,4 @@
-"""Estimator 2: an unscented filter of gimbal angles, the rival to which the paper compares its quaternion filter.
+"""An unscented filter of gimbal angles, the rival to which the paper compares its quaternion filter.
 
 State: the angles th (3), then the coefficients (p,), all noise added to covariances. Angles move at
 

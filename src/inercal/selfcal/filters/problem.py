@@ -24,10 +24,10 @@ from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import ALL, Layout, StateVector
 from inercal.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
 
-OFF, ANY, TWO, CHANNEL = range(4)
+_OFF, _ANY, _TWO, _CHANNEL = range(4)
 """Rules of a gate."""
 
-_RULES: Final = {"any": ANY, "two": TWO, "channel": CHANNEL}
+_RULES: Final = {"any": _ANY, "two": _TWO, "channel": _CHANNEL}
 
 
 class Gate(NamedTuple):
@@ -40,17 +40,17 @@ class Gate(NamedTuple):
     far: float
 
 
-def gate_of(gating: Gating | None) -> Gate:
+def _gate_of(gating: Gating | None) -> Gate:
     """The gate of the settings, off where there is none."""
     if gating is None:
-        return Gate(OFF, False, 0.0, 0.0)
+        return Gate(_OFF, False, 0.0, 0.0)
     return Gate(_RULES[gating.rule], gating.stops == "step", math.sin(gating.near), math.sin(gating.far))
 
 
 @kernel
 def watch(f: Vector, gate: Gate, near: NDArray[np.int64]) -> None:
     """Update which accelerometers are ``near`` (3,) level, from the specific force of the encoders' attitude."""
-    if gate.rule == OFF:
+    if gate.rule == _OFF:
         return
     g = math.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
     for i in range(3):
@@ -64,20 +64,20 @@ def watch(f: Vector, gate: Gate, near: NDArray[np.int64]) -> None:
 def admitted(i: int, gate: Gate, near: NDArray[np.int64]) -> bool:
     """True if accelerometer ``i`` takes part."""
     count = near[0] + near[1] + near[2]
-    if gate.rule == ANY:
+    if gate.rule == _ANY:
         return bool(count == 0)
-    if gate.rule == TWO:
+    if gate.rule == _TWO:
         return bool(count < 2)
-    return bool(gate.rule == OFF or near[i] == 0)
+    return bool(gate.rule == _OFF or near[i] == 0)
 
 
 @kernel
 def updating(gate: Gate, near: NDArray[np.int64]) -> bool:
     """False where the whole step of update stops, encoders too: with rule ``channel`` as soon as one is near level."""
-    if gate.rule == OFF or not gate.whole_step:
+    if gate.rule == _OFF or not gate.whole_step:
         return True
     count = near[0] + near[1] + near[2]
-    return bool(count < 2) if gate.rule == TWO else bool(count == 0)
+    return bool(count < 2) if gate.rule == _TWO else bool(count == 0)
 
 
 class NoiseLevels(NamedTuple):
@@ -163,7 +163,7 @@ class FilterProblem:
             noise.gyro_walk_sigma, noise.accelerometer_walk_sigma,
             np.where(self.states.layout.turning, 1.0, 0.5 * (noise.base_sway / noise.encoder) ** 2),
         )  # fmt: skip
-        return FilterModel(self.world, levels, gate_of(self.filter.gating), self.states.layout)
+        return FilterModel(self.world, levels, _gate_of(self.filter.gating), self.states.layout)
 
 
 def problem(settings: SelfcalSettings) -> FilterProblem:
@@ -176,7 +176,11 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
 @dataclass(frozen=True, eq=False)
 class Start:
     """A start other than the first encoder reading: ``attitude`` (4,) q_bp at the first row, and its standard deviation
-    ``sigma`` [rad] about each axis."""
+    ``sigma`` [rad] about each axis.
+
+    Where encoders read, it may be off by any angle for ``error-state`` and ``map``. Where they never do, by up to 45
+    degrees for ``map``, and by none to speak of for a filter: 1 degree leaves coefficients several u off.
+    """
 
     attitude: Array
     sigma: float

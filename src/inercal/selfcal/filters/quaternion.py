@@ -1,4 +1,4 @@
-"""Estimator 1, the filter of the paper: sigma points of a quaternion as it is, with a factor of the covariance.
+"""The filter of the paper: sigma points of a quaternion as it is, with a factor of the covariance.
 
 The factor is that of the eigenvalues, which for a covariance is the paper's singular value decomposition at two thirds
 of its cost; a study may ask for ``svd`` itself, or for ``cholesky``.

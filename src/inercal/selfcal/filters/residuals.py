@@ -1,4 +1,4 @@
-"""Residuals of a recording at attitudes and coefficients: all rows at once, with derivatives, for batch estimators.
+"""Residuals of a recording at attitudes and coefficients: all rows at once, with derivatives, for the batch estimator.
 
 Attitudes change to the right, ``q qexp(dtheta)`` with dtheta (3,) [rad] about the axes of p; coefficients are in the
 linear form. Derivatives are those of the model, so that a residual changes by minus them.
@@ -26,7 +26,6 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal.estimators import FilterKind
 from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, apart, updating, watch
 from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
@@ -124,18 +123,14 @@ def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> N
     return passed
 
 
-def normalised(residual: Array, measured: Measurements, attitude_variance: Array | float = 0.0) -> Array:
-    """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured.
-
-    ``attitude_variance`` (m, 1) [rad^2] is added to that of the encoders' attitude about each axis.
-    """
+def normalised(residual: Array, measured: Measurements) -> Array:
+    """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured."""
     encoders = np.einsum("kij,kj->ki", measured.root, residual[:, 3:])
-    variance = np.sum(measured.root**2, axis=2) + attitude_variance
-    return np.where(measured.used, np.hstack([residual[:, :3], encoders / np.sqrt(variance)]), np.nan)
+    deviation = np.sqrt(np.sum(measured.root**2, axis=2))
+    return np.where(measured.used, np.hstack([residual[:, :3], encoders / deviation]), np.nan)
 
 
 def batch_result(
-    kind: FilterKind,
     recording: Recording,
     problem: FilterProblem,
     measured: Measurements,
@@ -145,7 +140,7 @@ def batch_result(
     innovations: Array | None,
     message: str,
 ) -> FilterResult:
-    """Result of an estimator of whole recordings, but its time.
+    """Result of the batch estimator, but its time.
 
     ``path``: attitudes (n, 4) and standard deviations (n, 3) [rad]; ``coefficients`` (p,) and their covariance (p, p);
     ``innovations`` (m, 6), None where no history is wanted; ``message`` says why it did not converge.
@@ -156,7 +151,7 @@ def batch_result(
         history = History(*path, np.tile(c, (rows, 1)), np.tile(np.sqrt(np.diag(covariance)), (rows, 1)))
     cosine = np.abs(np.cos(recording.th[:, 1]))
     return FilterResult(
-        kind=kind,
+        kind="map",
         names=problem.names,
         coefficients=c,
         covariance=covariance,

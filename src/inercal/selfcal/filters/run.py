@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.estimate.factor import NEGATIVE
 from inercal.selfcal.estimators import FilterKind
-from inercal.selfcal.filters import error_state, gimbal, multiplicative, quaternion
+from inercal.selfcal.filters import error_state, gimbal, quaternion
 from inercal.selfcal.filters.batch import estimate_map
 from inercal.selfcal.filters.filter_result import (
     FilterResult,
@@ -23,10 +23,8 @@ from inercal.selfcal.filters.filter_result import (
     estimate_of,
 )
 from inercal.selfcal.filters.gaps import advance, initial, joined
-from inercal.selfcal.filters.linear import estimate_linear
 from inercal.selfcal.filters.problem import FilterProblem, Start
 from inercal.selfcal.filters.second_pass import is_due, second_pass
-from inercal.selfcal.filters.start import estimate_lm
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.recording import Recording, Steps
 
@@ -35,11 +33,8 @@ _LOADED = set[FilterKind]()
 
 
 def recursive(kind: FilterKind) -> ModuleType | None:
-    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map``, ``lm`` and ``linear``."""
-    return {
-        "error-state": error_state, "mukf": multiplicative, "svd-qukf": quaternion, "gimbal-ukf": gimbal,
-        "map": None, "lm": None, "linear": None,
-    }[kind]  # fmt: skip
+    """The module of a recursive filter, with ``initial`` and ``advance``; None for ``map``."""
+    return {"error-state": error_state, "svd-qukf": quaternion, "gimbal-ukf": gimbal, "map": None}[kind]
 
 
 def estimate(
@@ -61,15 +56,14 @@ def estimate(
     kind = problem.filter.kind if kind is None else kind
     module = recursive(kind)
     if module is None:
-        whole = {"map": estimate_map, "lm": estimate_lm, "linear": estimate_linear}[kind]
-        return whole(recording, problem, start, history)
+        return estimate_map(recording, problem, start, history)
     load_kernels(kind, problem)
     began = time.perf_counter()
     state = initial(module, problem, recording.th[0], recording.rate[0], start)
     state, trace, rows = _passed(module, state, problem, recording, history, courses and not brief)
     if not brief and is_due(kind, problem):
         begun = initial(module, problem, recording.th[0], recording.rate[0], start)
-        state = second_pass(module, begun, state, problem, recording.steps, recording.held, recording.walked)
+        state = second_pass(begun, state, problem, recording.steps, recording.held, recording.walked)
         for name, row in vars(estimate_of(state, problem)).items() if rows is not None else ():
             getattr(rows, name)[-1:] = row
     seconds = time.perf_counter() - began

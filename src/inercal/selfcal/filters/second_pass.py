@@ -1,4 +1,4 @@
-"""A second pass of a filter, linearised at what the first one found.
+"""A second pass of the error-state filter, linearised at what the first one found.
 
 A filter linearises where it stands. While the base and the scale of the gyros are unknown, products of two errors of
 some hundred parts in a million are larger than what is left of low noise in the end: the first rows then make up
@@ -16,7 +16,6 @@ Cathey 1993, "The iterated Kalman filter update as a Gauss-Newton method", IEEE 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxplus, normalize
 from inercal.selfcal.estimators import FilterKind
-from inercal.selfcal.filters.error_state import with_attitude
+from inercal.selfcal.filters import error_state
 from inercal.selfcal.filters.filter_result import State
 from inercal.selfcal.filters.gaps import advance, initial
 from inercal.selfcal.filters.problem import FilterProblem
@@ -32,16 +31,13 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import NAMES
 from inercal.selfcal.platform.recording import Steps
 
-_TWICE: tuple[FilterKind, ...] = ("error-state", "mukf")
-
 
 def is_due(kind: FilterKind, problem: FilterProblem) -> bool:
-    """True for filters of more than the paper's coefficients, but its own filters."""
-    return kind in _TWICE and len(problem.prior) > len(NAMES)
+    """True for the error-state filter of more than the paper's coefficients."""
+    return kind == "error-state" and len(problem.prior) > len(NAMES)
 
 
 def second_pass(
-    module: ModuleType,
     begun: State,
     found: State,
     problem: FilterProblem,
@@ -66,8 +62,8 @@ def second_pass(
     if begun.covariance[
         :3, 3:
     ].any():  # the attitude is that of the encoders, whose errors are those of the states
-        begun = with_attitude(begun, problem, None, problem.noise.encoder, steps.rate[0])
-    state, _ = advance(module, begun, problem, steps, held, False, walked)
+        begun = error_state.with_attitude(begun, problem, None, problem.noise.encoder, steps.rate[0])
+    state, _ = advance(error_state, begun, problem, steps, held, False, walked)
     again = _with_prior(state, (about, narrow), (problem.mean, problem.prior))
     sound = np.isfinite(again.covariance).all() and (np.diag(again.covariance) > 0.0).all()
     return again if sound else found
@@ -105,15 +101,15 @@ class Kept(NamedTuple):
         """True where another pass is due."""
         return 0 < len(self.rows) == self.used
 
-    def passed(self, module: ModuleType, problem: FilterProblem, found: State) -> tuple[State, Kept]:
+    def passed(self, problem: FilterProblem, found: State) -> tuple[State, Kept]:
         """The state after another pass through all rows kept, and the rows with room for as many more."""
         first, steps = self.rows[0, 7:10], self.rows[1:]
         held = np.flatnonzero(steps[:, 10]).tolist()
         rate, acc, th, later = (np.ascontiguousarray(steps[:, k : k + 3]) for k in (1, 4, 7, 12))
         dt, warm = (np.ascontiguousarray(steps[:, k]) for k in (0, 15))
         taken = Steps(dt, rate, acc, th, later, warm)
-        begun = initial(module, problem, first, steps[0, 1:4])
-        state = second_pass(module, begun, found, problem, taken, held, steps[:, 11])
+        begun = initial(error_state, problem, first, steps[0, 1:4])
+        state = second_pass(begun, found, problem, taken, held, steps[:, 11])
         more = Kept() if self.used >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.used)
         return state, more
 

@@ -77,9 +77,9 @@ def of_attitude(filtered: FilterResult, reference: Array | None) -> dict[str, An
 
 def differing(filtered: FilterResult, others: Mapping[FilterKind, FilterResult]) -> list[Finding]:
     """``estimators_differ``: the batch estimator, which linearises all rows where it ends, is far from the one that
-    counts. Not of ``lm``, which weighs the noise of the gyros otherwise, and says so by its u, nor of other states."""
+    counts; not where the two have other states."""
     batch = others.get("map")
-    if batch is None or not (batch.converged and filtered.converged) or filtered.kind == "lm":
+    if batch is None or not (batch.converged and filtered.converged):
         return []
     if batch.names != filtered.names:
         return []

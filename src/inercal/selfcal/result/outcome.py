@@ -50,7 +50,7 @@ MODEL = Formula(
     "force in p (+g up at rest), $w_c$ the commanded or measured rate of the platform against inertial space"
 )
 
-EXTENSION = Formula(
+_EXTENSION = Formula(
     r"; $\mathrm{kg}_1$ on the diagonal of $M$; $q_{\mathrm{encoders}} = \mathrm{qexp}(\beta) q$, $\beta$ the zero of "
     "the encoders against the base"
 )
@@ -81,7 +81,7 @@ def assemble(
         COMMAND,
         settings,
         recording.sources,
-        MODEL + (EXTENSION if {"kg1", "beta"} <= {*kinds} else "") + _on_rig(kinds),
+        MODEL + (_EXTENSION if {"kg1", "beta"} <= {*kinds} else "") + _on_rig(kinds),
         REFERENCES + ESTIMATORS[filtered.kind].publications,
         _conditions(recording, settings),
     )

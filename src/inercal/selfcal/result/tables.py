@@ -106,8 +106,7 @@ def of_attitudes(filters: Mapping[FilterKind, FilterResult], reference: Array) -
     return Table(
         "Errors of the attitude",
         "Root mean square over all rows of the estimated less the true components of the unit quaternion q_bp, and of "
-        "the angle between both. A filter knows the rows up to its own, map and lm all; those of lm hold the wander of "
-        "the gyros.",
+        "the angle between both. A filter knows the rows up to its own, map all.",
         heads("filter", *(f"q{k}" for k in range(4)), "angle [″]"),
         tuple(rows),
     )

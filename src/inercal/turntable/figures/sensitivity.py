@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 _FLAGS = 12
 """Flagged positions that a page lists."""
 
-MAP = "viridis"
+_MAP = "viridis"
 """Colour map of indices over positions, where white says that there is no index."""
 
-PUBLISHED = (("ax", "dalpha_y2"), ("ay", "dalpha_x2"), ("az", "dphi_y1"))
+_PUBLISHED = (("ax", "dalpha_y2"), ("ay", "dalpha_x2"), ("az", "dphi_y1"))
 """Output and factor of the maps in figure 5 of Zhao et al. 2023."""
 
 
@@ -217,17 +217,17 @@ def maps(indices: Indices, joints: Sequence[str], flagged: Sequence[Flag]) -> Pi
         return None
     pairs = [
         (indices.outputs.index(output), indices.factors.index(factor))
-        for output, factor in PUBLISHED
+        for output, factor in _PUBLISHED
         if output in indices.outputs and factor in indices.factors
     ]
-    published = len(pairs) == len(PUBLISHED)
+    published = len(pairs) == len(_PUBLISHED)
     if not published:
         size = np.nan_to_num(indices.first).sum(axis=1)
         pairs = [(o, int(np.argmax(size[o]))) for o in range(len(indices.outputs))]
     columns = min(3, len(pairs))
     top = max((float(np.nanmax(indices.first[o, :, k], initial=0.0)) for o, k in pairs), default=0.0) or 1.0
     colours, across = (
-        Colours(MAP, 0.0, top, "S", 0.8 / (-(-len(pairs) // columns)) ** 0.5),
+        Colours(_MAP, 0.0, top, "S", 0.8 / (-(-len(pairs) // columns)) ** 0.5),
         circle_axes(joints),
     )
     panels = []

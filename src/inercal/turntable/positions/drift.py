@@ -24,13 +24,13 @@ from inercal.turntable.readings import Readings
 from inercal.turntable.regression import Effects, Regression
 from inercal.turntable.settings import BiasDrift
 
-TERMS = 15
+_TERMS = 15
 """Terms of the series of a random walk at most; what is left out is 1/(4 TERMS) of its variance."""
 
-STEP = 0.3
+_STEP = 0.3
 """Step of the logarithm of the size of a walk for its information."""
 
-SHORTEST, LONGEST = 0.02, 2.0
+_SHORTEST, _LONGEST = 0.02, 2.0
 """Time constants that are looked for, over the length of the test."""
 
 Fit = Callable[[Array, Effects], Regression]
@@ -138,7 +138,7 @@ def _exponential(means: Readings, fit: Fit, unit: str) -> Drift:
         done = fit(means.y, Effects(_own(means, np.exp(-s / np.exp(log_tau))), none))
         return float(np.sum(np.log(np.square(done.residuals).sum(axis=0))))
 
-    grid = np.linspace(np.log(SHORTEST), np.log(LONGEST), 12)
+    grid = np.linspace(np.log(_SHORTEST), np.log(_LONGEST), 12)
     best = int(np.argmin([misfit(each) for each in grid]))
     ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
     tau = float(np.exp(minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-3}).x))
@@ -165,7 +165,7 @@ def _walk(means: Readings, fit: Fit, unit: str) -> Drift:
     restricted likelihood."""
     n, channels = means.y.shape
     s = fraction(means.times)
-    order = np.pi * (np.arange(min(TERMS, n - 1)) + 0.5)
+    order = np.pi * (np.arange(min(_TERMS, n - 1)) + 0.5)
     basis = np.sqrt(2.0) * np.sin(s[:, None] * order) / order
     walks = np.concatenate([_one(basis, k, channels) for k in range(channels)], axis=-1)
     none = np.zeros((n, channels, 0))
@@ -175,9 +175,9 @@ def _walk(means: Readings, fit: Fit, unit: str) -> Drift:
 
     start = fit(means.y, Effects(none, none))
     log = _highest(likelihood, float(np.log(max(start.noise.max(), 1e-300))))
-    low, mid, high = (likelihood(log + step) for step in (-STEP, 0.0, STEP))
+    low, mid, high = (likelihood(log + step) for step in (-_STEP, 0.0, _STEP))
     # the variance of the logarithm of a variance is two over its degrees of freedom
-    dof, size = max(1.0, 0.5 * (2.0 * mid - low - high) / STEP**2), float(np.exp(log))
+    dof, size = max(1.0, 0.5 * (2.0 * mid - low - high) / _STEP**2), float(np.exp(log))
     done = fit(means.y, Effects(none, walks * size))
     many = walks.shape[-1]
     nuisance = ("bias_walk", size, size / np.sqrt(2.0 * dof), unit)

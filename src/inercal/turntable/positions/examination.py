@@ -30,20 +30,20 @@ from inercal.turntable.weights import whitened
 MOST = 4
 """Faults named at most, one beside the other."""
 
-SIMPLER = 0.8
+_SIMPLER = 0.8
 """Logarithm of the chance of a fault, over that of the likeliest, with which one of fewer parameters goes before it."""
 
-TINY = 1e-300
+_TINY = 1e-300
 """Least chance that has a logarithm."""
 
-MANY = 1e6
+_MANY = 1e6
 """Degrees of freedom from which a variance counts as known."""
 
-FEW = 10.0
+_FEW = 10.0
 """Degrees of freedom of the noise, in every channel, below which a stray reading is not told from chance: of 250 sound
 tumbles with some five 3 were named."""
 
-SEEN = 0.01
+_SEEN = 0.01
 """Part of a fault's effect outside the terms below which it does not show."""
 
 
@@ -180,8 +180,8 @@ def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk
         n, c
     )
     own = np.eye(c) - np.einsum("nap,nbp->nab", *[Q[: n * c].reshape(n, c, -1)] * 2)
-    free = np.linalg.eigvalsh(own)[:, 0] > SEEN
-    if len(means.times) < 3 or not free.any() or fit.noise_dof.max() < FEW:
+    free = np.linalg.eigvalsh(own)[:, 0] > _SEEN
+    if len(means.times) < 3 or not free.any() or fit.noise_dof.max() < _FEW:
         return []
     score = np.full(n, -np.inf)
     score[free] = np.einsum("na,na->n", left[free], np.linalg.solve(own[free], left[free][..., None])[..., 0])
@@ -204,7 +204,7 @@ def _likely(
     tested.sort(key=lambda each: each.chance)
     # a heading that is wrong is a field to the ground too: of faults that explain about as much the simplest
     as_good = [
-        each for each in tested if np.log(each.chance + TINY) < SIMPLER * np.log(tested[0].chance + TINY)
+        each for each in tested if np.log(each.chance + _TINY) < _SIMPLER * np.log(tested[0].chance + _TINY)
     ]
     simplest = min(as_good, key=lambda each: len(each.values), default=None)
     return tested if simplest is None else [simplest, *(each for each in tested if each is not simplest)]
@@ -230,7 +230,7 @@ def _seen(fit: Regression, asked: Iterable[Fault], risk: float) -> tuple[list[Se
         size[size == 0.0] = 1.0
         left = beside(whole / size)
         _, s, vt = np.linalg.svd(left, full_matrices=False)
-        known = s > SEEN
+        known = s > _SEEN
         base = vt[known].T / s[known] / size[:, None]
         columns = beside(whole @ base)
         gain = np.einsum("nam,nab->mnb", columns[: n * c].reshape(n, c, -1), white.inverse)
@@ -247,13 +247,13 @@ def _reach(m: int, parts: Array, noise_dof: Array, risk: float) -> float:
     if not m:
         return math.inf
     nu = _dof(parts, noise_dof)
-    return math.sqrt(chdtri(m, risk) if nu > MANY else m * fdtri(m, nu, 1.0 - risk))
+    return math.sqrt(chdtri(m, risk) if nu > _MANY else m * fdtri(m, nu, 1.0 - risk))
 
 
 def _dof(parts: Array, noise_dof: Array) -> float:
     """Degrees of freedom of a variance, by Welch and Satterthwaite: of each channel's noise, ``parts`` (c,) of the
     variance, those of ``noise_dof`` (c,)."""
-    return 1.0 / max(float(np.sum(np.square(parts) / noise_dof)), 1.0 / MANY)
+    return 1.0 / max(float(np.sum(np.square(parts) / noise_dof)), 1.0 / _MANY)
 
 
 def _hypothesis(seen: Seen) -> Hypothesis[Array]:
@@ -291,5 +291,5 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
         for s, g in zip(now.noise, np.moveaxis(now.effect_gain[before:], -1, 0), strict=True)
     ]
     nu = _dof(np.array(parts), now.noise_dof)
-    chance = float(fdtrc(m, nu, statistic)) if nu < MANY else float(chdtrc(m, m * statistic))
+    chance = float(fdtrc(m, nu, statistic)) if nu < _MANY else float(chdtrc(m, m * statistic))
     return Tested(seen, seen.base @ values, chance)

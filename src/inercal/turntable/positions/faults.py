@@ -16,10 +16,10 @@ from inercal.turntable.model import UNIT_GAINS
 from inercal.turntable.readings import Readings, apart
 from inercal.turntable.regression import Regression
 
-WARM_UP = (0.05, 0.15, 0.4)
+_WARM_UP = (0.05, 0.15, 0.4)
 """Time constants of a warm-up that are tried, over the length of the test."""
 
-STEP = 1e-4
+_STEP = 1e-4
 """Angle [rad] for derivatives by the angle of a joint."""
 
 
@@ -118,7 +118,7 @@ def _drifts(means: Readings, fit: Regression) -> Iterator[Fault]:
         one = _on(means, k, np.ones_like(s))[..., 0]
         column = _on(means, k, s - 0.5)
         yield Fault(f"trend {name}", "trend", column, what, _of_output, "trend", within=one)
-        for tau in WARM_UP:
+        for tau in _WARM_UP:
             column = _on(means, k, np.exp(-s / tau))
             what = f"a warm-up of {name}, with a time constant of {tau:g} of the test,"
             within = -column[..., 0] / tau
@@ -179,9 +179,9 @@ def _heading(means: Readings, fit: Regression, k: int) -> Iterator[Fault]:
 def _joints(means: Readings, fit: Regression) -> Iterator[Fault]:
     """Harmonics of the angles of the joints, and the sense in which they were reached."""
     sense, joints = approach(means.angles), fit.model.chain.joints
-    for j, (joint, step) in enumerate(zip(joints, STEP * np.eye(len(joints)), strict=True)):
+    for j, (joint, step) in enumerate(zip(joints, _STEP * np.eye(len(joints)), strict=True)):
         ends = [fit.model.outputs(fit.angles + sign * step, fit.c) for sign in (1.0, -1.0)]
-        slope = (ends[0] - ends[1])[..., None] / (2.0 * STEP)
+        slope = (ends[0] - ends[1])[..., None] / (2.0 * _STEP)
         for order, word in ((1, "first"), (2, "second")):
             angle = order * fit.angles[:, j]
             waves = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
@@ -206,8 +206,8 @@ def approach(angles: Array) -> Array:
     """
     sense = np.zeros_like(angles)
     for k, step in enumerate(apart(angles[1:], angles[:-1]), start=1):
-        half = np.abs(np.abs(step) - np.pi) < STEP
-        sense[k] = np.where(half, 0.0, np.where(np.abs(step) > STEP, np.sign(step), sense[k - 1]))
+        half = np.abs(np.abs(step) - np.pi) < _STEP
+        sense[k] = np.where(half, 0.0, np.where(np.abs(step) > _STEP, np.sign(step), sense[k - 1]))
     return sense
 
 

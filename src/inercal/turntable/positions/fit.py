@@ -102,7 +102,7 @@ def choose_terms(
     without = identify_channels(rest, angles)
     if choice == "stated":
         return rest, without, ""
-    if not leaves_rates_unknown(what, without):
+    if not _leaves_rates_unknown(what, without):
         return whole, what, ""
     free = [words for each in what for words in each.words]
     free.sort(
@@ -117,7 +117,7 @@ def earth_rate_of(model: TableModel) -> str:
     return "stated" if fixed else "fitted"
 
 
-def leaves_rates_unknown(whole: tuple[Identified, ...], without: tuple[Identified, ...]) -> bool:
+def _leaves_rates_unknown(whole: tuple[Identified, ...], without: tuple[Identified, ...]) -> bool:
     """True if fewer combinations are unknown once the earth rate is: ``whole`` with its terms, ``without`` them."""
     return any(len(a.words) > len(b.words) for a, b in zip(whole, without, strict=True))
 

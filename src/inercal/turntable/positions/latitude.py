@@ -22,10 +22,10 @@ from inercal.turntable.limits import LIMITS
 from inercal.turntable.positions.shifts import Scale
 from inercal.turntable.regression import Regression, solve
 
-NEAREST = float(np.radians(1.0))
+_NEAREST = float(np.radians(1.0))
 """Distance from a pole [rad] within which no fit is made."""
 
-SMALL = 0.01
+_SMALL = 0.01
 """Step for the derivative, in u."""
 
 
@@ -48,12 +48,12 @@ def of_latitude(
 
     def fitted(steps: float) -> Array:
         """The values at a latitude that is so many u away."""
-        latitude = np.clip(at + steps * site.latitude_u, NEAREST - np.pi / 2, np.pi / 2 - NEAREST)
+        latitude = np.clip(at + steps * site.latitude_u, _NEAREST - np.pi / 2, np.pi / 2 - _NEAREST)
         return np.asarray(slope @ _refitted(fit, float(latitude)))
 
     low, high, middle = fitted(-1.0), fitted(1.0), fitted(0.0)
     bend = 0.5 * (low + high) - middle
-    first = 0.5 * (fitted(SMALL) - fitted(-SMALL)) / SMALL
+    first = 0.5 * (fitted(_SMALL) - fitted(-_SMALL)) / _SMALL
     third = 0.5 * (high - low) - first  # f3 u^3 / 6
     part = np.abs(bend) / np.where(u > 0.0, u, np.inf)
     harm = tuple(name for name, each in zip(names, part, strict=True) if each > LIMITS.bent_part)

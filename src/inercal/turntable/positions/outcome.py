@@ -35,7 +35,7 @@ from inercal.turntable.settings import TurntableSettings
 
 COMMAND = "calibrate turntable"
 
-MODELS = {
+_MODELS = {
     "gyrowheel": Formula(
         r"$y = k_x w_x + k_y w_y + k_z w_z + \mathrm{DX}_F + \mathrm{DX}_X a_x + \mathrm{DX}_Y a_y$ "
         r"${}+ \mathrm{DX}_Z a_z + \mathrm{DX}_{XX} a_x^2 + \mathrm{DX}_{YY} a_y^2 + \mathrm{DX}_{XY} a_x a_y$ "
@@ -71,7 +71,7 @@ class Terms:
     slope: Array
 
 
-def terms_of(fit: Regression) -> Terms:
+def _terms_of(fit: Regression) -> Terms:
     """Values of the terms of all channels."""
     values, slope = np.zeros(len(fit.c)), np.zeros((len(fit.c), len(fit.c)))
     for channel, block in zip(fit.model.channels, fit.model.blocks, strict=True):
@@ -115,7 +115,7 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
 def assemble(record: Record, readings: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
     unit = readings.unit.si
-    model, conditions = MODELS[settings.instrument.kind], _conditions(record, readings, settings)
+    model, conditions = _MODELS[settings.instrument.kind], _conditions(record, readings, settings)
     sources_read = (*record.sources, *settings.chain.sources)
     basis = studied(COMMAND, settings, sources_read, model, REFERENCES, conditions)
     findings = [*record.findings, *fitting.findings]
@@ -143,7 +143,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         return nothing(*_without_fit(readings, fitting, settings))
     fit, drift = fitting.fit, fitting.drift
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        terms = terms_of(fit)
+        terms = _terms_of(fit)
         finite = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))

@@ -15,16 +15,16 @@ from inercal.turntable.positions.examination import Examination, Seen, Tested
 from inercal.turntable.regression import Regression
 from inercal.units import Unit
 
-SHOWN = 4
+_SHOWN = 4
 """Coefficients and faults named at most in a sentence."""
 
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 """Part of what a fault does to the values below which a direction of it does nothing."""
 
-DRIFTS = frozenset({"trend", "warm-up", "scale drift", "reading"})
+_DRIFTS = frozenset({"trend", "warm-up", "scale drift", "reading"})
 """Kinds of faults that are others in each run."""
 
-REMEDY: Mapping[str, str] = {
+_REMEDY: Mapping[str, str] = {
     "trend": "let it settle, state bias_drift, or take the positions in an order without one",
     "warm_up": 'wait until it is warm, or state bias_drift = "exponential"',
     "heading_suspect": "check the azimuth, and state it as [rig.base] azimuth with dbase_z for its uncertainty",
@@ -60,7 +60,7 @@ def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: U
         harm = tuple(name for name, by in zip(scale.names, most, strict=True) if by > LIMITS.harmful_shift)
         text = (
             f"{each.fault.what} of {each.fault.size(each.values, shown)} (by chance with a probability of "
-            f"{each.chance:.1g}): it shifts {_largest(scale.names, shift)}; {REMEDY[each.fault.code]}"
+            f"{each.chance:.1g}): it shifts {_largest(scale.names, shift)}; {_REMEDY[each.fault.code]}"
         )
         yield Finding(each.fault.code, text, "", harm)
     worst: dict[str, Blind] = {}
@@ -88,7 +88,7 @@ def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) 
         shift = effect @ base
         size = np.linalg.norm(shift, axis=1)
         worst = int(np.argmax(size))
-        if size[worst] > ROUNDING * np.linalg.norm(effect):
+        if size[worst] > _ROUNDING * np.linalg.norm(effect):
             values = base @ shift[worst] * 2.0 / size[worst] ** 2
             words = f"{seen.fault.what} of {seen.fault.size(values, shown)} ({scale.names[worst]})"
             return Blind(reach * float(size[worst]), words)
@@ -139,11 +139,11 @@ def doubts(examination: Examination, fit: Regression, scale: Scale) -> list[Type
 
 def _source(tested: Tested, shifts: Array) -> TypeB:
     """A fault as a source of ``shifts`` (p, q) of the values; the base and the table are the same in repeat runs."""
-    return TypeB(f"{tested.fault.what}, not excluded", 1.0, "1", shifts, redrawn=tested.fault.kind in DRIFTS)
+    return TypeB(f"{tested.fault.what}, not excluded", 1.0, "1", shifts, redrawn=tested.fault.kind in _DRIFTS)
 
 
 def _largest(names: Sequence[str], shift: Array) -> str:
     """The values that are shifted most, in words."""
-    order = np.argsort(-np.abs(shift))[:SHOWN]
+    order = np.argsort(-np.abs(shift))[:_SHOWN]
     texts = [f"{names[k]} by {shift[k]:+.1f} u" for k in order if abs(shift[k]) > 0.1]
     return ", ".join(texts) or "no value by more than 0.1 u"

@@ -84,7 +84,7 @@ class Across:
     rates: Array
 
 
-def none_across(n: int) -> Across:
+def _none_across(n: int) -> Across:
     """All of n stays about the gyro's own axis, at one attitude."""
     return Across(np.ones(n, dtype=bool), np.zeros((n, 0)), (), np.zeros((n, 0)))
 
@@ -172,7 +172,7 @@ def fit_rates(
     across : Across, optional
         Stays about other axes, of which there are misalignments.
     """
-    beside = across or none_across(len(rate))
+    beside = across or _none_across(len(rate))
     own = np.flatnonzero(beside.own)
     terms = np.column_stack([_columns(given.x, order, asymmetry, beside), beside.rates])
     n, p = terms.shape

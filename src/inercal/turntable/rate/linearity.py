@@ -23,7 +23,7 @@ from inercal.arrays import Array
 from inercal.estimate.result import COVERAGE
 from inercal.turntable.rate.stays import Effect
 
-DRAWS = 4000
+_DRAWS = 4000
 """Draws of the errors: bounds of 95.45 % are then reached in 95.45(33) %."""
 
 SEED = 20261122
@@ -87,13 +87,13 @@ def drawn_errors(
     rng : Generator
     """
     dof = max(noise_dof, 1.0)  # as the budget counts them
-    spread = np.ones(DRAWS) if np.isinf(dof) else np.sqrt(rng.chisquare(dof, DRAWS) / dof)
+    spread = np.ones(_DRAWS) if np.isinf(dof) else np.sqrt(rng.chisquare(dof, _DRAWS) / dof)
     none = [np.zeros((n, 0))]
     redrawn = scale * np.hstack(none + [each.shift for each in effects if each.redrawn])
     common = scale * np.hstack(none + [each.shift for each in effects if not each.redrawn])
-    drawn = noise * rng.standard_normal((DRAWS, n)) / spread[:, None]
-    drawn += np.linalg.norm(redrawn, axis=1) * rng.standard_normal((DRAWS, n))
-    return np.asarray(drawn + rng.standard_normal((DRAWS, common.shape[1])) @ common.T)
+    drawn = noise * rng.standard_normal((_DRAWS, n)) / spread[:, None]
+    drawn += np.linalg.norm(redrawn, axis=1) * rng.standard_normal((_DRAWS, n))
+    return np.asarray(drawn + rng.standard_normal((_DRAWS, common.shape[1])) @ common.T)
 
 
 def largest(of: Deviations, errors: Array, span: float) -> Largest:

@@ -22,7 +22,7 @@ from inercal.sensitivities.indices import Indices, by_position
 from inercal.turntable.model import stated_values
 from inercal.turntable.settings import TurntableSettings
 
-DEGREES = (1, 1, 2)
+_DEGREES = (1, 1, 2)
 """Degrees of the blocks of (w, a, a x a) in the attitude."""
 
 
@@ -89,7 +89,7 @@ def exact(
 ) -> Indices:
     """Exact parts of variance of drift outputs at positions (n, joints) [rad]."""
     return by_position(
-        lambda chain, at: dense.analyse(dense.blocks(chain, at, DEGREES), outputs, shapley, second),
+        lambda chain, at: dense.analyse(dense.blocks(chain, at, _DEGREES), outputs, shapley, second),
         settings.chain,
         positions(settings.chain, angles),
     )

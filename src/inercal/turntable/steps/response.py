@@ -27,13 +27,13 @@ from inercal.arrays import Array
 SEED = 20261122
 """Of the draws: a record gives the same values each time."""
 
-DRAWS = 40_000
+_DRAWS = 40_000
 """Draws, about: of a probability of 95 % they miss 0.1 %."""
 
-LEAST_ROOM = 1e-3
+_LEAST_ROOM = 1e-3
 """Of a part f of an interval f (1 - f), at least: the prior 1 / sqrt(f (1 - f)) has no upper end."""
 
-OUTSIDE = 2
+_OUTSIDE = 2
 """Distinct inputs that are to lie beyond a dead zone on either side."""
 
 SYMBOLS = ("K0", "K1", "K_dz", "K_th", "K_hyst")
@@ -137,7 +137,7 @@ def respond(
     choices = [_choice(xs, ys, beside, i, j, known, least) for i, j in _pairs(np.unique(xs))]
     likely = max(each.log for each in choices)
     taken = [each for each in choices if each.log > likely - 25.0]
-    count = max(64, DRAWS // len(taken))
+    count = max(64, _DRAWS // len(taken))
     drawn = [_draws(each, both_ways, count, known is None, rng) for each in taken]
     values = np.concatenate([each for each, _ in drawn])
     weight = np.concatenate(
@@ -204,7 +204,7 @@ class _Choice:
 def _pairs(levels: Array) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """All pairs of stretches between distinct inputs in which the two edges may lie."""
     stretches = list(zip(levels[:-1].tolist(), levels[1:].tolist(), strict=True))
-    inner = stretches[OUTSIDE - 1 : len(stretches) - OUTSIDE + 1]
+    inner = stretches[_OUTSIDE - 1 : len(stretches) - _OUTSIDE + 1]
     return [(one, other) for k, one in enumerate(inner) for other in inner[k:]]
 
 
@@ -249,7 +249,7 @@ def _choice(
         sigma,
         dof,
         volume + likelihood - (len(parts) - 1) * log(size),
-        bool(len(np.unique(x[below])) <= OUTSIDE or len(np.unique(x[above])) <= OUTSIDE),
+        bool(len(np.unique(x[below])) <= _OUTSIDE or len(np.unique(x[above])) <= _OUTSIDE),
     )
 
 
@@ -278,7 +278,7 @@ def _draws(
     half = narrow + (wide - narrow) * rng.random(count)
     fits = (lag >= 0.0) & (wide > narrow)
     part = np.where(fits, lag, 0.0) / np.where(fits, half, 1.0)
-    weight = area * (wide - narrow) / np.sqrt(np.maximum(part * (1.0 - part), LEAST_ROOM))
+    weight = area * (wide - narrow) / np.sqrt(np.maximum(part * (1.0 - part), _LEAST_ROOM))
     weight = np.where(fits, weight, 0.0)
     terms = [0.5 * (low + high), K1, 2.0 * half, np.maximum(half, 2.0 * lag)]
     if both_ways:

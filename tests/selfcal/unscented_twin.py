@@ -1,12 +1,10 @@
-"""Plain NumPy twins of the multiplicative and the gimbal-angle unscented filter, written from their equations."""
+"""The plain NumPy twin of the gimbal-angle unscented filter, written from its equations."""
 
 from itertools import product
 
 import numpy as np
 
-from inercal.geometry.rotations import boxminus, boxplus, conjugate, exp, multiply, rotate
-
-TURNS = 2.0 * np.pi * np.arange(-4, 5)
+from inercal.geometry.rotations import conjugate, exp, multiply, rotate
 
 
 def points(P):
@@ -65,47 +63,6 @@ def kalman(P, Pxz, Pzz, r):
     gain = np.linalg.solve(Pzz, Pxz.T).T
     P = P - gain @ Pzz @ gain.T
     return gain @ r, 0.5 * (P + P.T), r @ np.linalg.solve(Pzz, r)
-
-
-def multiplicative(recording, problem, q, sigma):
-    """Attitude, coefficients, covariance and NIS (n - 1,) of the multiplicative filter."""
-    world, noise, p = problem.world, problem.noise, len(problem.prior)
-    c, P = np.zeros(p), np.diag(np.append(np.full(3, sigma), problem.prior) ** 2)
-    nis = []
-    for dt, w, acc, th in zip(recording.dt, recording.rate, recording.acc[1:], recording.th[1:], strict=True):
-        D = points(P)
-        all_q = np.concatenate([q[None], boxplus(q, D[:, :3])])
-        all_c = np.concatenate([c[None], c + D[:, 3:]])
-        turn = gyro(all_c, w) * dt
-        all_q = multiply(multiply(exp(-based(world.earth, all_c) * dt), all_q), exp(turn))
-        e = boxminus(all_q[1:], all_q[0])
-        # of all vectors of this rotation the one nearest to where the deviation was turned
-        before = rotate(exp(-turn[0]), D[:, :3])
-        length = np.maximum(np.linalg.norm(e, axis=1), 1e-300)[:, None, None]
-        ways = e[:, None] * (1.0 + TURNS[:, None] / length)
-        best = np.argmin(np.linalg.norm(ways - before[:, None], axis=2), axis=1)
-        e = np.where(np.linalg.norm(before, axis=1)[:, None] < 1.0, e, ways[np.arange(len(e)), best])
-        D[:, :3] = e - e.mean(axis=0)
-        q = boxplus(all_q[0], e.mean(axis=0))
-        P = moments(D, D)
-        P[:3, :3] += noise.angle_random_walk**2 * dt * np.eye(3)
-        total = 0.0
-        if np.isfinite(th).all():
-            measured, J = joints(th[None], world)
-            R = noise.encoder**2 * (J[0] @ J[0].T + 0.05**2 * np.eye(3))
-            x, P, part = kalman(P, P[:, :3].copy(), P[:3, :3] + R, boxminus(measured[0], q))
-            q, c, total = boxplus(q, x[:3]), c + x[3:], total + part
-        kept = np.isfinite(acc)
-        if kept.any():
-            D = points(P)
-            z = accelerometers(boxplus(q, D[:, :3]), c + D[:, 3:], world.up)[:, kept]
-            deviation = z - z.mean(axis=0)
-            Pzz = moments(deviation, deviation) + noise.accelerometer**2 * np.eye(kept.sum())
-            x, P, part = kalman(P, moments(D, deviation), Pzz, acc[kept] - z.mean(axis=0))
-            q, c, total = boxplus(q, x[:3]), c + x[3:], total + part
-        nis.append(total if kept.any() or np.isfinite(th).all() else np.nan)
-        q = q / np.linalg.norm(q)
-    return q, c, P, np.array(nis)
 
 
 def angle_rates(th, w, earth, world):
