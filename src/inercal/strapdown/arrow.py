@@ -150,9 +150,15 @@ def kept(H: Array, g: Array, rows: Array, right: Array) -> None:
 
 def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None:
     """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
-    (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts."""
+    (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts.
+
+    Raises `numpy.linalg.LinAlgError` where a matrix is singular.
+    """
     m, n = chain.F.shape[1], len(g)
-    _eliminate_all(chain, H, g, rows, right, np.empty(n), np.empty((m, n)), np.empty((m, n)))
+    try:
+        _eliminate_all(chain, H, g, rows, right, np.empty(n), np.empty((m, n)), np.empty((m, n)))
+    except ZeroDivisionError as error:
+        raise np.linalg.LinAlgError("a pivot of the elimination is zero") from error
 
 
 @kernel
