@@ -198,6 +198,13 @@ def test_other_yaml_is_an_error_with_its_place(text):
         kalibr.loaded(text, "f.yaml")
 
 
+def test_the_head_of_opencv_is_passed_over():
+    """OpenCV writes ``%YAML:1.0``, which is no directive of YAML; lines are counted with it."""
+    assert kalibr.loaded("%YAML:1.0\n---\na: 1\n", "x") == {"a": 1}
+    with pytest.raises(InputError, match="x, line 3"):
+        kalibr.loaded("%YAML:1.0\n---\na: [1\n", "x")
+
+
 def test_a_bomb_is_refused_before_it_grows():
     """Nine lines by which each list holds the one before nine times: a billion texts."""
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]

@@ -23,6 +23,7 @@ kalibr, ICRA 2016.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -184,6 +185,7 @@ def loaded(text: str, where: object) -> Any:
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     if len(text) > _LONGEST:
         raise InputError(where, f"found {len(text)} characters, expected at most {_LONGEST} (YAML)")
+    text = re.sub(r"\A%YAML:[^\n]*", "", text)  # the head of OpenCV, which is no directive of YAML
     try:
         depth = 0
         for event in yaml.parse(text, loader):
