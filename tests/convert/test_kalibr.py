@@ -202,7 +202,7 @@ def test_the_head_of_opencv_is_passed_over():
     """OpenCV writes ``%YAML:1.0``, which is no directive of YAML; lines are counted with it."""
     assert kalibr.loaded("%YAML:1.0\n---\na: 1\n", "x") == {"a": 1}
     with pytest.raises(InputError, match="x, line 3"):
-        kalibr.loaded("%YAML:1.0\n---\na: [1\n", "x")
+        kalibr.loaded("%YAML:1.0\n---\na: ]\n", "x")
 
 
 def test_a_bomb_is_refused_before_it_grows():
