@@ -42,6 +42,10 @@ class Checked:
     head: str
 
 
+_NAMES = {"keep": "result", "supersede": "supersession of", "certificate": "certificate"}
+"""The rows that an event of each kind tells of, in words."""
+
+
 def check(store: Store, progress: Callable[[int, int], None] | None = None) -> Checked:
     """Walk chain, rows, objects and foreign keys, and name what was changed, missing or added."""
     faults: list[str] = []
@@ -81,7 +85,8 @@ def check(store: Store, progress: Callable[[int, int], None] | None = None) -> C
         for sha256 in sorted(loose)
     ]
     notes += [
-        f"{kind} {subject[:SHORT]}: secrets were taken out on {day}" for (kind, subject), day in freed.items()
+        f"{_NAMES[kind]} {subject[:SHORT]}: secrets were taken out on {day}"
+        for (kind, subject), day in freed.items()
     ]
     head = events[-1]["hash"] if events else BEGIN
     return Checked(tuple(faults), tuple(notes), len(events), len(results), len(there), head)
@@ -159,7 +164,7 @@ def _certificates(connection: Connection) -> dict[str, str]:
 
 def _told(kind: str, digests: dict[str, str], events: list[dict[str, Any]]) -> list[str]:
     """Faults of rows whose event is missing, or says something else, and of events whose rows are missing."""
-    what = {"keep": "result", "supersede": "supersession of", "certificate": "certificate"}[kind]
+    what = _NAMES[kind]
     known = {subject: digest for (of, subject), digest in told(events).items() if of == kind}
     faults = [
         f"{what} {str(subject)[:SHORT]}: missing, an event tells of it"
