@@ -62,13 +62,13 @@ def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
 
 
 def _refused(path: str | Path, error: Exception) -> InputError:
-    """One sentence for what the operating system said."""
+    """The refusal of a file, with the words of the operating system."""
     shown = repr(str(path)) if "\0" in str(path) else path
     return InputError(shown, f"cannot be written ({getattr(error, 'strerror', None) or error})")
 
 
 def _permissions(target: Path) -> int:
-    """Those of the file that is replaced: what was private stays so; of a new one those that the mask leaves."""
+    """Permissions of the replaced file, so that private stays private; of a new file those that the mask leaves."""
     try:
         return stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:

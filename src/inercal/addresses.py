@@ -127,7 +127,7 @@ def _addresses(text: str) -> Iterator[tuple[str, str]]:
 
 
 def _spans(text: str) -> Iterator[tuple[re.Match[str], int]]:
-    """Each scheme of a text, and where what follows it ends."""
+    """Matches of the schemes in a text, and the end of each address."""
     schemes = list(_SCHEME.finditer(text))
     for match, following in zip_longest(schemes, schemes[1:]):
         yield match, len(text) if following is None else following.start()

@@ -29,7 +29,7 @@ _MEASURED = {"acc": ("acceleration", *RAW), "gyro": ("rate", *RAW)}
 
 @dataclass(frozen=True)
 class Convention:
-    """One tool's way.
+    """The convention of another tool: its correction, files and units.
 
     ``equation`` is its correction in plain text, ``suffixes`` are those of its files, the first the usual one.
     ``si`` is true where its samples are in SI units; outputs in another physical unit are then converted, counts

@@ -55,7 +55,7 @@ class ImuModel:
 
     @property
     def placed(self) -> Placed | None:
-        """Places and delay of the accelerometers, where there are any."""
+        """Places and delay of the accelerometers, where a calibration states them."""
         return Placed(self.levers, self.delay) if self.levers.any() or self.delay else None
 
     def correct(self, acc: Array, gyro: Array | None) -> tuple[Array, Array | None]:

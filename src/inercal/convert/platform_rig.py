@@ -32,7 +32,7 @@ BY_TEMPERATURE = ("kg0_T1", "ka0_T1", "ka1_T1")
 
 
 def _three() -> Array:
-    """Nothing, of each axis."""
+    """Zeros for the three axes."""
     return np.zeros(3)
 
 
@@ -53,11 +53,11 @@ class RigPlatform:
 
     @property
     def linear(self) -> bool:
-        """True where there is nothing beside the triads."""
+        """True if the rig adds nothing to the triads."""
         return not self.needs(("K2", "S_asym", *BY_FORCE, *BY_TEMPERATURE))
 
     def needs(self, groups: tuple[str, ...]) -> tuple[str, ...]:
-        """Those of some groups of coefficients that are not zero."""
+        """Nonzero coefficients of these groups."""
         return tuple(group for group in groups if self._of[group].any())
 
     @property

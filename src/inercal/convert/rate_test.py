@@ -70,7 +70,7 @@ class RateGyros:
         )
 
     def _misalignments(self) -> list[str]:
-        """Misalignments between gyros of which both are calibrated."""
+        """Misalignments between pairs of calibrated gyros."""
         return [f"T_{i}{j}" for i in self.axes for j in self.axes if f"T_{i}{j}" in self.values]
 
     def _across(self, axis: str, rates: Mapping[str, Array]) -> Any:

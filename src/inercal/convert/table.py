@@ -114,7 +114,7 @@ class TableInstrument:
         return Correction(work, reads, writes, settings, findings=findings, ranges=ranges)
 
     def _terms(self, channel: str) -> ChannelModel:
-        """The channel with its terms that are not 0, and the leading one."""
+        """The channel with its nonzero terms, and the leading term."""
         whole = channel_model(self.kind, channel)
         return whole.without(
             s for s in whole.symbols if s != whole.leading and not np.any(self.values.get(s, 0.0))

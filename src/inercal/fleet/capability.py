@@ -118,7 +118,7 @@ def spreads(rows: Sequence[Row], specification: Specification) -> tuple[Spread, 
 def _spread(
     name: str, places: Sequence[tuple[int, int]], rows: Sequence[Row], specification: Specification
 ) -> Spread:
-    """One coefficient."""
+    """The spread of one coefficient over the fleet."""
     every = [rows[i].coefficients[j] for i, j in places]
     unit = every[0].unit
     same = [k for k, each in enumerate(every) if each.unit == unit]

@@ -43,7 +43,7 @@ def columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
 
 
 def _finite(value: float) -> float | None:
-    """The number, None where it is not finite."""
+    """A finite number, else None."""
     return value if math.isfinite(value) else None
 
 

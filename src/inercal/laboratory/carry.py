@@ -84,7 +84,7 @@ def _copy(store: Store, folder: Path, progress: Progress) -> None:
 
 
 def _copy_objects(source: Objects, target: Objects, names: set[str], progress: Progress) -> None:
-    """Objects from one place to another."""
+    """Copy objects from one store to another."""
     for done, sha256 in enumerate(sorted(names), start=1):
         target.add(source.read(sha256))
         if progress is not None:
@@ -170,7 +170,7 @@ def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: s
 
 
 def _insert(connection: Connection, table: type[Base], rows: list[dict[str, Any]]) -> None:
-    """Add rows, if there are any."""
+    """Insert rows into a table."""
     if rows:
         connection.execute(insert(table), rows)
 
@@ -178,7 +178,7 @@ def _insert(connection: Connection, table: type[Base], rows: list[dict[str, Any]
 def _number(
     connection: Connection, table: type[Instrument | Reference], row: dict[str, Any], keys: tuple[str, ...]
 ) -> int:
-    """The number in this store of a row of another, which is added where it is new."""
+    """The primary key in this store of a row of another store; a new row is added."""
     columns = table.__table__.columns
     same = [columns[key] == row[key] for key in keys]
     number: int | None = connection.execute(select(columns["id"]).where(*same)).scalar()

@@ -49,7 +49,7 @@ class Listed:
 
     @property
     def date(self) -> str:
-        """When it was measured, where that was stated, else when it was kept: the day."""
+        """The day of the measurement, or of the keeping where the study states none."""
         return str(self.measured or self.made)[:10]
 
 

@@ -64,7 +64,7 @@ class Chart:
 
 
 def chart(series: Series) -> Chart:
-    """The charts of a coefficient that should stay what it is."""
+    """The control charts of a coefficient that should not change."""
     n = len(series.y)
     centre, low, high, z = (np.full(n, np.nan) for _ in range(4))
     if n > FIRST:

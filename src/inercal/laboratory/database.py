@@ -92,7 +92,7 @@ def writing(engine: Engine, where: str) -> Iterator[Connection]:
 
 @contextmanager
 def _refusing(engine: Engine, where: str) -> Iterator[None]:
-    """Turn what the database says into one sentence, in which no secret of its address stands."""
+    """Turn an error of the database into one sentence without the secrets of its address."""
     try:
         yield
     except DBAPIError as error:

@@ -79,7 +79,7 @@ class History:
 
 
 def day_of(row: Mapping[str, Any]) -> tuple[date, bool]:
-    """The day of a calibration, and True where its study says it (else that on which it was kept)."""
+    """The day of a calibration, and True if the study states it (else the day of the keeping)."""
     for text, stated in ((row["measured"], True), (row["made"], False)):
         try:
             return date.fromisoformat(str(text)[:10]), stated
@@ -158,7 +158,7 @@ def _check_names(names: Sequence[str] | None, found: set[str], there: set[str]) 
 def _course(
     name: str, unit: str, rows: Sequence[Mapping[str, Any]], specification: Specification | None, at: date
 ) -> Course:
-    """One coefficient."""
+    """The course of one coefficient."""
     rows = sorted(rows, key=lambda row: (day_of(row)[0], row["made"]))
     shown, size = _shown(rows[0]["command"], unit)
     dates = tuple(day_of(row)[0] for row in rows)

@@ -149,7 +149,7 @@ def table(history: History) -> str:
 
 
 def rows_csv(history: History) -> str:
-    """All calibrations of all coefficients, a line each."""
+    """A CSV line for each coefficient of each calibration."""
     out = io.StringIO()
     names = (
         "date",
@@ -186,7 +186,7 @@ def rows_csv(history: History) -> str:
 
 
 def _cell(value: float) -> str:
-    """A number in full, empty where there is none."""
+    """A number with all its digits, or an empty cell."""
     return "" if np.isnan(value) else repr(float(value))
 
 
@@ -235,7 +235,7 @@ def _picture(name: str, courses: Sequence[Course], history: History) -> Picture:
 
 
 def _padded(first: float, last: float) -> tuple[float, float]:
-    """Limits with some room."""
+    """Limits of an axis, with a margin."""
     room = 0.03 * max(last - first, 0.1)
     return first - room, last + room
 

@@ -173,7 +173,7 @@ class Rows:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of all rows."""
+        """SHA-256 of the rows of a result."""
         more = [[dict(row) for row in many] for many in (self.coefficients, self.references)]
         return digest_of([dict(self.result), self.instrument, self.sources, *more])
 
@@ -218,7 +218,7 @@ def references_of(data: Mapping[str, Any]) -> tuple[dict[str, str], ...]:
 
 
 def _finite(value: float) -> float | None:
-    """The number, or None where it is not finite."""
+    """A finite number, else None."""
     return value if math.isfinite(value) else None
 
 
@@ -239,7 +239,7 @@ def add_rows(connection: Connection, rows: Rows, instrument_id: int | None) -> N
 
 
 def _instrument(connection: Connection, item: Item) -> int:
-    """The number of an instrument, which is added where it is new."""
+    """The primary key of an instrument; a new instrument is added."""
     same = (Instrument.maker == item.maker, Instrument.model == item.model, Instrument.serial == item.serial)
     number = connection.execute(select(Instrument.id).where(*same)).scalar()
     if number is None:
@@ -250,7 +250,7 @@ def _instrument(connection: Connection, item: Item) -> int:
 
 
 def _reference(connection: Connection, row: Mapping[str, str]) -> int:
-    """The number of a reference, which is added where it is new."""
+    """The primary key of a reference; a new reference is added."""
     same = (getattr(Reference, key) == row[key] for key in row)
     number = connection.execute(select(Reference.id).where(*same)).scalar()
     if number is None:

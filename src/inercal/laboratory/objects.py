@@ -154,7 +154,7 @@ class Objects:
         return system.open(f"{path}/{sha256[:2]}/{sha256}", "rb")
 
     def names(self) -> set[str]:
-        """The SHA-256 of all objects, by their names."""
+        """The SHA-256 of every object."""
         if self.local:
             names = {name for _, _, files in os.walk(self.where) for name in files}
         else:

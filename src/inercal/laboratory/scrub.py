@@ -96,7 +96,7 @@ def scrub(store: Store) -> Scrubbed:
 
 
 def _place_of_objects(store: Store) -> str | None:
-    """The address of the objects without its secret, None where it holds none; raises `InputError` out of reach."""
+    """The address of the objects without its secret, None without a secret; raises `InputError` out of reach."""
     if not holds_secret(store.objects.where):
         return None
     place = without_login(store.objects.where)
@@ -116,7 +116,7 @@ _ELSEWHERE = (
 
 
 def _replaced(connection: Connection, objects: Objects) -> Iterator[tuple[str, str]]:
-    """Objects with a secret, each with the one that takes its place, which rows point to then."""
+    """Write objects with a secret anew, and let rows point to the new ones: old and new SHA-256."""
     for table, column, cleaned in (
         (Result, "object", _result),
         (Result, "report", _page),
@@ -148,7 +148,7 @@ def _page(content: bytes) -> bytes:
 
 
 def _certificate(content: bytes) -> bytes:
-    """A certificate without secrets, those in the files inside it among them."""
+    """A certificate without secrets in its texts and in the files inside it."""
     from lxml import etree
 
     from inercal.laboratory.certificate.elements import DCC

@@ -165,7 +165,7 @@ def conformity(
 
 
 def judged(estimate: Estimate, specification: Specification) -> dict[str, Conformity]:
-    """Conformity of each coefficient that has limits."""
+    """Conformity of the coefficients with limits."""
     shown = estimate.shown_units()
     found = {}
     for p in estimate.parameters.values():

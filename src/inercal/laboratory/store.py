@@ -119,7 +119,7 @@ def _found(given: str | None) -> tuple[Place, Engine]:
 
 
 def _opened(place: Place, engine: Engine) -> Store:
-    """The store, with the objects where it says they are."""
+    """The store, with the objects at the address in its settings."""
     with reading(engine, place.shown) as connection:
         objects = connection.execute(select(Setting.value).where(Setting.key == "objects")).scalar()
     if objects is None:

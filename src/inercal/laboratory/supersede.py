@@ -1,4 +1,4 @@
-"""A result that another takes the place of."""
+"""Supersession: a newer result takes the place of an older one."""
 
 from __future__ import annotations
 

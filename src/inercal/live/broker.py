@@ -58,7 +58,7 @@ class Broker:
             raise OSError(said)
 
     def send(self, payloads: Sequence[bytes]) -> int:
-        """Publish some messages; how many of them the broker has confirmed when all are, or the connection is lost."""
+        """Publish messages; how many of them the broker has confirmed when all are, or the connection is lost."""
         if self.lost:
             return 0
         sent = [self._client.publish(self._topic, payload, qos=1) for payload in payloads]

@@ -27,7 +27,7 @@ class SinkCounts:
 
 @dataclass(frozen=True)
 class Counts:
-    """Everything that came, and what became of it.
+    """Counts of pieces, rows and losses of a measurement.
 
     ``received`` bytes are ``used`` in rows, ``left_out`` (in no whole or sound row), ``dropped`` for want of room, or
     still ``waiting``. Of ``rows``, ``lost`` are missing by their counter or their stamps, ``disordered`` came after a
@@ -55,7 +55,7 @@ class Counts:
     sinks: dict[str, SinkCounts]
 
     def __str__(self) -> str:
-        """One line for people."""
+        """The counts in one line."""
         parts = [f"{self.rows} rows"]
         named = {
             "lost": self.lost, "out of order": self.disordered, "repeated": self.repeated, "late": self.late,
@@ -76,7 +76,7 @@ class Counts:
 
 
 class Stamps:
-    """Judges rows by their stamps as they come."""
+    """Judges the order of time stamps, row by row."""
 
     def __init__(self) -> None:
         self.lost = self.disordered = self.repeated = self.late = 0

@@ -79,7 +79,7 @@ class Feed:
 
     @property
     def missing(self) -> int | None:
-        """Frames that are missing by their counter, None without one."""
+        """Number of frames that the counter shows missing, None without a counter."""
         counter = "" if self._frame is None else self._frame.counter
         return self._turns[counter].missing if counter else None
 

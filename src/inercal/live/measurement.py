@@ -50,7 +50,7 @@ class Alarm:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a measurement is begun with.
+    """The settings of a measurement.
 
     ``make`` prepares the estimator: it is called with what takes messages and findings, and loads kernels, which may
     take seconds. ``files`` are inputs that no sink and no recording may replace.
@@ -160,7 +160,7 @@ class Measurement:
 
     @property
     def counts(self) -> Counts:
-        """Everything that came, and what became of it."""
+        """Counts of pieces, rows and losses."""
         feed, intake, watch, stamps = self._feed, self._intake, self._watch, self._watch.stamps
         used, left_out = (0, 0) if feed is None else (feed.used, feed.left_out)
         missing = None if feed is None else feed.missing
@@ -270,12 +270,12 @@ class Measurement:
                 self._given += 1
 
     def _settle(self) -> None:
-        """Have all sinks write what they were given."""
+        """Let every sink write its rows."""
         for outlet in self._outlets:
             outlet.settle()
 
     def _close_outlets(self) -> None:
-        """Close all sinks."""
+        """Close every sink."""
         for outlet in self._outlets:
             outlet.close()
 

@@ -95,7 +95,7 @@ class Outlet:
         self._thread.start()
 
     def offer(self, row: Row) -> None:
-        """Take a row, or drop it where there is no room."""
+        """Take a row, or drop the row if the queue is full."""
         with self._change:
             if self.failure or len(self._rows) >= ROOM:
                 if not self._dropped and not self.failure:
@@ -217,7 +217,7 @@ class _AtOnce:
         return GOODBYE
 
     def settle(self) -> None:
-        """Nothing is held back."""
+        """Hold no row back."""
 
 
 class _Printed(_AtOnce):
@@ -231,7 +231,7 @@ class _Printed(_AtOnce):
         self._print(",".join(columns))
 
     def write(self, rows: Sequence[Row]) -> int:
-        """Print them."""
+        """Print lines."""
         if rows:
             self._print("\n".join(row.text for row in rows))
         return len(rows)
@@ -251,7 +251,7 @@ class _TextFile(_AtOnce):
         os.write(self._file, f"{','.join(columns)}\n".encode())
 
     def write(self, rows: Sequence[Row]) -> int:
-        """Append them whole."""
+        """Append whole lines to the file."""
         data = "".join(f"{row.text}\n" for row in rows).encode()
         while data:
             data = data[os.write(self._file, data) :]
@@ -263,7 +263,7 @@ class _TextFile(_AtOnce):
             os.fsync(self._file)
 
     def close(self) -> None:
-        """Close it."""
+        """Close the file."""
         os.close(self._file)
 
 
@@ -341,7 +341,7 @@ class _Messages(_AtOnce):
         return confirmed
 
     def _again(self) -> bool:
-        """True where the broker is there again."""
+        """True once the broker answers again."""
         if time.monotonic() < self._due:
             return False
         try:

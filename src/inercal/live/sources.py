@@ -74,7 +74,7 @@ class _Serial:
             raise OSError(str(error)) from error
 
     def read(self) -> Piece:
-        """The bytes that are there, or the first that comes."""
+        """The bytes that have arrived; waits for the first."""
         return Piece(self._port.read(min(max(1, self._port.in_waiting), PIECE)))
 
     def close(self) -> None:
@@ -113,7 +113,7 @@ class _Udp:
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """A socket that receives datagrams, with room for some seconds of them."""
+    """A socket for datagrams, whose buffer has room for some seconds."""
     family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
     made = socket.socket(family, socket.SOCK_DGRAM)
     try:

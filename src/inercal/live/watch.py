@@ -84,7 +84,7 @@ class Watched:
 
     @property
     def settings(self) -> object:
-        """Those of the estimator."""
+        """The settings of the estimator."""
         return self.inner.settings
 
     def initial(self) -> Any:

@@ -187,7 +187,7 @@ def _improbable(chi2: float, dof: int) -> bool:
 
 
 def _nothing(deviation: AllanDeviation, terms: tuple[str, ...], why: Finding) -> NoiseCoefficients:
-    """No coefficient, and nothing known of any."""
+    """A fit without any coefficient."""
     none = np.zeros(0)
     span = (deviation.interval, deviation.interval * (deviation.samples // 2))
     return NoiseCoefficients(

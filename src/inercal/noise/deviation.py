@@ -233,7 +233,7 @@ def _runs(samples: Array) -> Counts:
 
 
 def _counted(flags: NDArray[np.bool_]) -> Counts:
-    """Running number (n+1,) of those that are true."""
+    """Cumulative count (n+1,) of true values."""
     counts = np.zeros(len(flags) + 1, np.int32)
     np.cumsum(flags, out=counts[1:])
     return counts

@@ -130,7 +130,7 @@ def noise_of(record: Record) -> Noise:
 
 
 def _groups(record: Record) -> list[list[Column]]:
-    """The channels that measure motion, those of one clock together."""
+    """Channels of motion, grouped by clock."""
     groups: dict[int, list[Column]] = {}
     for column in record.columns.values():
         if _CHANNELS.fullmatch(column.name) and column.unit.dimension in _DIMENSIONS:
@@ -166,7 +166,7 @@ def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
 
 
 def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, tuple[Finding, ...]]:
-    """The fit of one channel, None where it shows nothing, and findings about it."""
+    """The fit of a channel, None if it shows no noise, and the findings."""
     if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
         return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
     whole = noise_coefficients(curve, at)
@@ -268,7 +268,7 @@ def _curve(channel: ChannelNoise) -> dict[str, Any]:
 
 
 def _verdict(channels: list[ChannelNoise], disturbed: Mapping[str, Unrest]) -> tuple[Status, str]:
-    """Status and its sentence."""
+    """The status and the message of the result."""
     seconds = max(each.curve.samples * each.curve.interval for each in channels)
     moving = [name for name, each in disturbed.items() if each.moving]
     if moving:

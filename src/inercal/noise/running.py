@@ -42,7 +42,7 @@ class Window(NamedTuple):
         return np.asarray(self.moments[4])
 
     def clear(self) -> None:
-        """Take all samples out."""
+        """Remove every sample."""
         self.place[:] = 0
         self.moments[:] = np.nan
 
@@ -60,7 +60,7 @@ class Octaves(NamedTuple):
     origin: Array
 
     def clear(self) -> None:
-        """Forget all samples."""
+        """Remove every sample."""
         self.sums[:] = 0.0
         self.clusters[:] = 0
 
@@ -79,7 +79,7 @@ class Octaves(NamedTuple):
 
 
 def empty_window(window: int, channels: int) -> Window:
-    """A window of that many samples, two or more, none of them there yet."""
+    """An empty window for so many samples, at least two."""
     return Window(np.zeros((window, channels)), np.zeros(2, np.int64), np.full((5, channels), np.nan))
 
 

@@ -204,7 +204,7 @@ class Chain:
         )
 
     def with_scope(self, scope: Scope) -> Chain:
-        """The chain with all errors of one scope."""
+        """The chain with the given scope for every error."""
         return self.with_errors(*(replace(error, scope=scope) for error in self.errors))
 
     def draw(self, rng: np.random.Generator, positions: int | Array, runs: int | None = None) -> Array:
@@ -311,7 +311,7 @@ class Chain:
         )
 
     def _values(self, angles: Array, errors: Array) -> Iterable[tuple[Element, Array]]:
-        """Each element with its values (*batch)."""
+        """Elements of the chain with their values (*batch)."""
         error = 0
         for element, joint in zip(self.elements, self._joint_before, strict=True):
             if isinstance(element, Joint):

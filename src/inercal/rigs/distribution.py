@@ -173,7 +173,7 @@ def density(pdf: Callable[[Array], ArrayLike], low: float, high: float) -> Distr
 
 
 def _positive(size: float) -> float:
-    """The size itself; a distribution without spread is no error."""
+    """A positive size; a distribution without spread is no error."""
     if not (math.isfinite(size) and size > 0.0):
         raise ValueError(f"found the size {size:g}, expected a number above zero")
     return float(size)

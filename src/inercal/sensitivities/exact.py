@@ -116,7 +116,7 @@ def positions(chain: Chain, angles: ArrayLike) -> Array:
 
 
 def drop_rounding(parts: VarianceParts, outputs: Sequence[Output], spread: float) -> VarianceParts:
-    """Parts with no variance at all where there is that of rounding errors only.
+    """Variance components, set to zero where they are rounding errors.
 
     ``spread`` is the variance of all matrices together, to which a row of unit length is exposed.
     """

@@ -70,7 +70,7 @@ class Key:
         return hmac.compare_digest(given.encode(), self.secret.encode())
 
     def is_password(self, given: str) -> bool:
-        """True for the password, where there is one."""
+        """True if a text is the password of the workbench."""
         same = hmac.compare_digest(_digest(given), _digest(self.password))
         return bool(self.password) and same
 

@@ -77,12 +77,12 @@ class Job:
 
     @property
     def result(self) -> Path | None:
-        """The file of its result, None before there is one."""
+        """The file of the result, None before the end."""
         return path if (path := self.folder / "result.json").is_file() else None
 
     @property
     def report(self) -> Path | None:
-        """The page of its result, None before there is one."""
+        """The report of the result, None before the end."""
         return path if (path := self.folder / "report.html").is_file() else None
 
     @property

@@ -82,7 +82,7 @@ def figure(columns: Sequence[str], rows: Rows, title: str) -> dict[str, Any]:
 
 
 def _number(value: float | str | None) -> float | None:
-    """The number, None for what is none."""
+    """A finite number, else None."""
     return value if isinstance(value, float | int) and math.isfinite(value) else None
 
 

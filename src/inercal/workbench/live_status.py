@@ -83,5 +83,5 @@ def _quantity(quantity: Any) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """The number, None where it is not finite."""
+    """A finite number, else None."""
     return value if math.isfinite(value) else None

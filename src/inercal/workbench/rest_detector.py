@@ -61,12 +61,12 @@ class _Beside:
 
     @property
     def settings(self) -> object:
-        """Those of the estimator."""
+        """The settings of the detector."""
         return self.inner.settings
 
     @property
     def failure(self) -> str:
-        """That of the estimator."""
+        """The failure of the detector."""
         return str(getattr(self.inner, "failure", ""))
 
     def initial(self) -> Any:

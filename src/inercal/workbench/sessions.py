@@ -56,22 +56,22 @@ class Session:
 
     @property
     def recordings(self) -> list[Path]:
-        """Its recordings, in the order of their names."""
+        """The recordings of the session, by name."""
         return [path for path in self.files if path.suffix.lower() not in (".toml", ".txt", ".json")]
 
     @property
     def files(self) -> list[Path]:
-        """All its files, in the order of their names."""
+        """The files of the session, by name."""
         return sorted(path for path in self.folder.iterdir() if path.is_file() and not _hidden(path.name))
 
     @property
     def map(self) -> Path | None:
-        """Its column map, None without one."""
+        """The column map of the session, None without a map."""
         return path if (path := self.folder / MAP).is_file() else None
 
     @property
     def study(self) -> Path | None:
-        """Its study, None without one."""
+        """The study of the session, None without a study."""
         return path if (path := self.folder / STUDY).is_file() else None
 
     def command(self, out: Path, report: Path) -> list[str]:

@@ -63,7 +63,7 @@ def administrative(
 
 
 def software() -> _Element:
-    """This program."""
+    """The element of the software: this program."""
     return dcc("software", words("name", "inercal"), dcc("release", __version__), dcc("type", "application"))
 
 

@@ -34,7 +34,7 @@ def si(name: str, *children: _Element | str | None) -> _Element:
 
 
 def _element(tag: str, children: Sequence[_Element | str | None], ref_type: str | None) -> _Element:
-    """An element with its text or its children, in their order."""
+    """An element with its text, or with its children in order."""
     made = etree.Element(tag, nsmap=NAMESPACES)
     if ref_type is not None:
         made.set("refType", ref_type)

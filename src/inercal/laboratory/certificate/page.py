@@ -44,7 +44,7 @@ class _Method:
 
 @dataclass(frozen=True)
 class _Section:
-    """One measurement result as it is printed."""
+    """A measurement result as the page prints it."""
 
     name: str
     methods: list[_Method]
@@ -135,7 +135,7 @@ def _facts(root: _Element) -> list[tuple[str, str]]:
 
 
 def _statements(root: _Element) -> list[tuple[str, str]]:
-    """Statements, each with its norm and clause."""
+    """Statements of the laboratory with norm and clause."""
     found = root.iterfind(".//dcc:statements/dcc:statement", NAMESPACES)
     return [
         (said, _joined(text(each, "dcc:norm"), text(each, "dcc:reference")))
@@ -145,7 +145,7 @@ def _statements(root: _Element) -> list[tuple[str, str]]:
 
 
 def _section(element: _Element) -> _Section:
-    """One measurement result."""
+    """The section of a measurement result."""
     methods = [
         _Method(
             text(each, "dcc:name/dcc:content"),
@@ -208,7 +208,7 @@ def _equipment(element: _Element) -> tuple[str, ...]:
 
 
 def _limits(element: _Element) -> str:
-    """Conformity of a quantity and its limits, in its own unit; empty where none is stated."""
+    """Conformity and limits of a quantity in its unit; empty where none is stated."""
     verdict = text(element, "dcc:measurementMetaData/dcc:metaData/dcc:conformity")
     ends = element.iterfind("dcc:measurementMetaData/dcc:metaData/dcc:data/dcc:quantity", NAMESPACES)
     values = [f"{quantity.value:.6g}" for each in ends for quantity in quantities_in(each, last=True)]

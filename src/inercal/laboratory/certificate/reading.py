@@ -144,7 +144,7 @@ def _item(root: _Element) -> str:
 
 
 def _measured(element: _Element, path: str | Path) -> Measured:
-    """One measurement result."""
+    """The measurement result of an element."""
     region = None
     quantities: list[Quantity] = []
     for each in quantities_of(element.iterfind("dcc:results/dcc:result", NAMESPACES)):
@@ -266,7 +266,7 @@ def _inside(element: _Element, path: str | Path) -> Estimate | None:
 
 
 def _consistent(quantities: Sequence[Quantity], region: Region) -> bool:
-    """True where numbers that stand beside the covariance too are the same there."""
+    """True if the covariance element repeats the same numbers."""
     stated = {each.label: (each.value, each.U) for each in quantities if each.label}
     there = zip(region.names, region.values.tolist(), region.U.tolist(), strict=True)
     return all(stated.get(name, (value, U)) == (value, U) for name, value, U in there)

@@ -91,7 +91,7 @@ def _refuse_unknown(estimate: Estimate) -> None:
 
 
 def _result(name: str, ref_type: str, parts: Iterable[_Element]) -> _Element:
-    """One ``result`` with its data."""
+    """The element ``result`` with its data."""
     return dcc("result", words("name", name), dcc("data", *parts), ref_type=ref_type)
 
 
@@ -195,7 +195,7 @@ def _temperature(degrees: float, u: float) -> _Element:
 
 
 def _condition(name: str, ref_type: str, value: _Element) -> _Element:
-    """One condition."""
+    """The element of one influence condition."""
     return dcc(
         "influenceCondition",
         words("name", name),
@@ -214,7 +214,7 @@ def _coefficient(p: Parameter, conform: Conformity | None) -> _Element:
 
 
 def _covariance(estimate: Estimate) -> _Element:
-    """All coefficients with their covariance, in SI, and in their own units where these are not SI."""
+    """Coefficients and covariance in SI, and once more in the units of the result where these are not SI."""
     found = [dsi(unit) for unit in estimate.units]
     region = _region(estimate, [from_dsi(text) for text, _ in found], np.array([size for _, size in found]))
     if not all(map(is_coherent, estimate.units)):

@@ -94,7 +94,7 @@ def certificate(
 def _conformity(
     lab: LabFile, estimates: Sequence[Estimate], where: object
 ) -> tuple[Specification, list[dict[str, Conformity]]]:
-    """The specification, and of each result what conforms."""
+    """The specification, and the conformity of each result."""
     specification = specification_of(lab.specification, where)
     limits_used(specification, estimates, where)
     return specification, [judged(estimate, specification) for estimate in estimates]

@@ -130,12 +130,12 @@ class _Desk:
             self.look()
 
     def stop(self) -> None:
-        """Ask it to end."""
+        """Ask the measurement to end."""
         with told():
             self.bench.measurements.stop(self.session)
 
     def look(self) -> None:
-        """Show how it stands."""
+        """Show the state of the measurement."""
         live = self.bench.measurements.of(self.session)
         if live is None:
             self.state.set_text("Nothing is measured.")
@@ -228,7 +228,7 @@ class _View:
         self.counts = ui.label().props('data-counts="1"')
 
     def chosen(self, event: Any) -> None:
-        """Draw another quantity."""
+        """Draw the quantity that was chosen."""
         self.title = event.value or ""
         self.draw()
 

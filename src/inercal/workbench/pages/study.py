@@ -157,7 +157,7 @@ Changed = Callable[[Key, str], None]
 
 
 def _choice(key: Key, change: Changed) -> None:
-    """One of some words."""
+    """A choice among words."""
     ui.select(
         ["", *key.choices], value=key.value if key.value in key.choices else "", label=key.name,
         on_change=lambda event: change(key, event.value),
