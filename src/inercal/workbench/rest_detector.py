@@ -61,12 +61,12 @@ class _Beside:
 
     @property
     def settings(self) -> object:
-        """The settings of the detector."""
+        """The settings of the estimator within."""
         return self.inner.settings
 
     @property
     def failure(self) -> str:
-        """The failure of the detector."""
+        """The failure of the estimator within, in words; empty without one."""
         return str(getattr(self.inner, "failure", ""))
 
     def initial(self) -> Any:
