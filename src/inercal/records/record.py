@@ -28,8 +28,8 @@ class Record:
 
     Reading never drops, sorts or interpolates: rows that could not be read, and stamps that are wrong, stand as NaN
     and are listed in ``findings``. Columns of files with different clocks keep their own time axes. ``labels`` holds
-    the text of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is, as
-    ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
+    the text of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is,
+    as ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
     uncertainty of a sample rate that was typed, 0 if it had none; None where stamps are the clock.
     """
 
