@@ -55,7 +55,7 @@ _JUDGED = 16
 
 
 class Order(NamedTuple):
-    """What is known of the time after some rows: the ``last`` sound stamp [s], NaN before the first, the last ``steps``
+    """Knowledge of the time after some rows: the ``last`` sound stamp [s], NaN before the first, the last ``steps``
     [s] between such, and the stamps that are ``held``, in doubt (NaN of rows without one)."""
 
     last: float = math.nan
@@ -118,7 +118,7 @@ class Order(NamedTuple):
         return bool(self.steps) and 0.0 <= held[-1] - self.last <= _LEAP * self.usual * len(held)
 
     def _overtaken(self, held: Sequence[float]) -> list[bool]:
-        """Whether stamps are sound, the newest of which goes on from before them all."""
+        """Verdicts on stamps, True for sound, the newest of which goes on from before them all."""
         between, rows = held[:-1], len(held)
         room = held[-1] - self.last >= (rows - 0.5) * sorted(self.steps)[len(self.steps) // 2]
         reach = self.last + _LEAP * self.usual * rows
@@ -126,7 +126,7 @@ class Order(NamedTuple):
         return [*(each or (not room and t <= reach) for each, t in zip(in_order, between, strict=True)), True]
 
     def _confirmed(self, held: Sequence[float]) -> list[bool] | None:
-        """Whether stamps are sound, the newest of which confirm each other; None where they do not."""
+        """Verdicts on stamps, True for sound, the newest of which confirm each other; None where they do not."""
         chain = [k for k, t in enumerate(held) if math.isfinite(t)][-_CHAIN:]
         steps = [held[b] - held[a] for a, b in itertools.pairwise(chain)]
         if len(chain) < _CHAIN or min(steps) < 0.0:
@@ -148,7 +148,7 @@ class Order(NamedTuple):
 
 
 def _ascending(low: float, stamps: Sequence[float], high: float) -> list[bool]:
-    """Which of some stamps stand in order between two others; NaN do."""
+    """True for those of some stamps that stand in order between two others; NaN do."""
     sound = []
     for t in stamps:
         inside = not (t < low or t > high)

@@ -32,7 +32,7 @@ class HeldRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Doubt:
-    """What is known of the time of a stream, and the rows in doubt, each a sample with the number of its line."""
+    """Knowledge of the time of a stream, and the rows in doubt, each a sample with the number of its line."""
 
     order: Order
     held: tuple[tuple[Sample, int], ...] = ()
