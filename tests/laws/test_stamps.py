@@ -57,7 +57,7 @@ def test_wrong_digits_are_found_and_no_others(changes):
     np.r_[T, T + 60.0], np.r_[T + 5.0, T], np.r_[T, T], np.repeat(T, 4), np.r_[T, 1.6 + 2.5 * T],
     T[::-1].copy(), np.delete(T, [50, 51, 52, 90]), with_stamps({100: 0.404, 101: 0.4}), with_stamps({200: 0.803}),
     np.floor(np.arange(400) / 5) * 0.1 + np.arange(400) % 5 * 1e-4, np.array([0.0, 60.0, 150.0, 400.0, 2000.0]),
-    np.r_[T, 1.7, 1.704],
+    np.r_[T, 1.7, 1.704], np.r_[T, with_stamps({1: 0.008, 2: 0.004}) + 60.0],
     ],
 )  # fmt: skip
 def test_gaps_clocks_that_were_set_bursts_and_rows_that_came_late_stay(t):

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -136,7 +137,10 @@ class Order(NamedTuple):
             return None
         first = chain[0]
         if self.last <= held[first]:
-            return [*_ascending(self.last, held[:first], held[first]), *[True] * (len(held) - first)]
+            in_order = _ascending(self.last, held[:first], held[first])
+            near = held[first] - _LEAP * max(steps) * len(held)  # as rows that only came late
+            late = [near <= t <= held[first] and t >= self.last for t in held[:first]]
+            return [*map(operator.or_, in_order, late), *[True] * (len(held) - first)]
         # before a clock that was set, or at the beginning: sound is what leads up to it
         sound, after = [True] * len(held), first
         for k in (k for k in reversed(range(first)) if math.isfinite(held[k])):
