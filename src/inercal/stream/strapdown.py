@@ -39,7 +39,7 @@ class StrapdownState(NamedTuple):
     """State after a row: ``rows`` (capacity, 7), of which ``filled`` are in use, with stamp, rate and force in SI;
     first and last sample of the ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,)
     after the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said; ``off``:
-    the last stamp was off the even steps, and stands on them, as ``told`` rows did."""
+    the last stamp was off the even steps, on which it was put; ``told`` such rows were said."""
 
     rows: Array
     filled: int
@@ -86,17 +86,8 @@ class Strapdown:
 
     def initial(self) -> StrapdownState:
         """No row seen."""
-        return StrapdownState(
-            np.empty((1024, 7)),
-            0,
-            np.empty((0, 2)),
-            np.full(SIZE, math.nan),
-            np.full(4, math.nan),
-            0,
-            False,
-            False,
-            0,
-        )
+        c, q = np.full(SIZE, math.nan), np.full(4, math.nan)
+        return StrapdownState(np.empty((1024, 7)), 0, np.empty((0, 2)), c, q, 0, False, False, 0)
 
     def step(self, state: StrapdownState, sample: Sample) -> tuple[StrapdownState, Sequence[Output]]:
         """The state after a row, and a line where a rest has ended."""
@@ -105,10 +96,9 @@ class Strapdown:
         if math.isnan(sample.t) and count < 2:
             return state._replace(filled=0), ()  # nothing says when it was
         t, off = self._stamp(state, sample, values)
-        if off and not math.isnan(sample.t):
-            if state.told < _SAID:
-                text = f"t: {sample.t:.10g} s is off the even steps, on which {t:.10g} s is taken"
-                self._say(Finding("outlying_time", text, f"row {count + 1}"))
+        if off and not math.isnan(sample.t) and state.told < _SAID:
+            text = f"t: {sample.t:.10g} s is off the even steps, on which {t:.10g} s is taken"
+            self._say(Finding("outlying_time", text, f"row {count + 1}"))
             state = state._replace(told=state.told + 1)
         if count == len(rows):
             rows = np.concatenate([rows, np.empty_like(rows)])
@@ -137,10 +127,10 @@ class Strapdown:
             return before + usual, state.off
         if abs(t - before - usual) <= LIMITS.uneven * usual:
             return t, False
-        if state.off:
+        if state.off:  # so it was the row before that did not go on
             raise RecordError(
                 self._where,
-                f"t: a step of {t - before:.4g} s after row {count} where {usual:.4g} s is usual, expected samples "
+                f"t: a step of {t - before:.4g} s after row {count - 1} where {usual:.4g} s is usual, expected samples "
                 "without gaps",
             )
         return before + usual, True
