@@ -152,15 +152,16 @@ def test_lost_disordered_and_repeated_datagrams_are_counted(study, tmp_path, req
     assert codes.count("backward_time") == codes.count("duplicate_time") == 1
 
 
-def test_one_wrong_digit_in_a_datagram_ends_nothing(study, tmp_path, request):
-    near, address = wire("udp", tmp_path)
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_wrong_digit_in_a_stamp_ends_nothing(kind, study, tmp_path, request):
+    near, address = wire(kind, tmp_path, request.getfixturevalue("broker") if kind == "mqtts" else None)
     request.addfinalizer(near.close)
     out = tmp_path / "out.csv"
     running = waiting(address, study, to=[f"text:{out}"])
     sent = rows(400)
     sent[200] = b"9" + sent[200]
     for line in (HEADER, *sent):
-        near.send(line.rstrip(b"\n"))
+        near.send(line)
     assert until(lambda: running.counts.rows == 400), running.counts
     counts = sound(running)
     assert (counts.lost, counts.disordered, counts.repeated, counts.outlying) == (0, 0, 0, 1)
