@@ -83,7 +83,7 @@ def test_in_a_stream(command, row, calibration, tmp_path, capsys):
     lines, study = lines_of(example, rows, tmp_path)
     row %= rows + 1
     log = str(tmp_path / "log.csv")
-    words = {"apply": [calibration, log, "--stream"], "monitor": [log, *study]}.get(
+    words = {"apply": [calibration, log, "--stream"], "monitor": [log]}.get(
         command, [log, *study, "--stream"]
     )
     found = []

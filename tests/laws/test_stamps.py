@@ -178,7 +178,7 @@ def test_a_stream_gives_each_row_once_and_a_wrong_stamp_is_empty():
 def test_a_doubt_outlives_its_process(cut, again, tmp_path):
     t = np.r_[with_stamps({199: 97.996}), T + 60.0]
     whole, _ = echoed(t)
-    saving = Saving(tmp_path / "state", 1)
+    saving = Saving(tmp_path / "state", 1000)
     echoed(t, saving, slice(None, cut))
     first = {"the same": 0, "one that goes on": cut, "one that overlaps": 150}[again]
     out, _ = echoed(t, saving, slice(first, None))
