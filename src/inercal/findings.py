@@ -36,6 +36,7 @@ CODES: dict[str, Code] = {
     "gap": Code("samples are missing", _NEVER, rank=15),
     "duplicate_time": Code("a time stamp is repeated", _NEVER),
     "backward_time": Code("time runs backward", _NEVER),
+    "outlying_time": Code("a time stamp is wrong, and set aside", _NEVER),
     "nan": Code("values are missing or not numbers", _NEVER),
     "bad_row": Code("rows that cannot be read as numbers", _NEVER),
     "truncated": Code("the file ends within a row", _NEVER),

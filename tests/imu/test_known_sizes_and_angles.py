@@ -24,6 +24,7 @@ from campaigns.rows import (
 from recordings import shipped
 from scipy.stats import binom
 
+import inercal as ic
 from inercal.errors import StudyError
 from inercal.findings import Status
 from inercal.imu.figures import page, pictures
@@ -263,6 +264,28 @@ def test_turns_of_a_real_unit_give_what_ferraris_gives():
     for axis in "xyz":
         here, there = alone[f"S_{axis}"], whole.estimate[f"S_{axis}"]
         assert abs(here.value - there.value) < 3.0 * np.hypot(here.u, there.u)
+
+
+@pytest.mark.parametrize("method", ["known_rates", "known_turns"])
+@for_each("row, t", [(0, 90.0), (700, 907.0), (700, 0.7), (-1, 9999.0)])
+def test_one_wrong_stamp_changes_next_to_nothing(method, row, t):
+    rng = np.random.default_rng(12)
+    if method == "known_rates":
+        options = KnownRatesSettings(tuple(RATES), tuple(RATES_U))
+        holds = [np.repeat(np.concatenate([means, 0.0 * means], axis=1).reshape(-1, 3), 300, axis=0)
+                 for means in platter(rng)[1]]  # fmt: skip
+        records = [record_of("gyro", x + rng.normal(size=x.shape), 0.01 * np.arange(len(x))) for x in holds]
+    else:
+        options, records = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), TILT), turns(rng)[1]
+    settings = ImuSettings(SITE, method=options)
+    first, *others = records
+    stamps = first["gyro_x"].t.copy()
+    stamps[row] = t
+    wrong = ic.record(t=stamps, gyro=first.triad("gyro").values, units={"gyro": "count"})
+    sound, found = (calibrate_files([each, *others], settings) for each in (first, wrong))
+    assert found.status is sound.status is Status.OK
+    assert [each.code for each in found.findings if each not in sound.findings] == ["outlying_time"]
+    assert np.all(np.abs(found.estimate.values - sound.estimate.values) < 0.05 * sound.estimate.u)
 
 
 @pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])

@@ -152,6 +152,25 @@ def test_lost_disordered_and_repeated_datagrams_are_counted(study, tmp_path, req
     assert codes.count("backward_time") == codes.count("duplicate_time") == 1
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_wrong_digit_in_a_stamp_ends_nothing(kind, study, tmp_path, request):
+    near, address = wire(kind, tmp_path, request.getfixturevalue("broker") if kind == "mqtts" else None)
+    request.addfinalizer(near.close)
+    out = tmp_path / "out.csv"
+    running = waiting(address, study, to=[f"text:{out}"])
+    sent = rows(400)
+    sent[200] = b"9" + sent[200]
+    for line in (HEADER, *sent):
+        near.send(line)
+    assert until(lambda: running.counts.rows == 400), running.counts
+    counts = sound(running)
+    assert (counts.lost, counts.disordered, counts.repeated, counts.outlying) == (0, 0, 0, 1)
+    assert out.read_text().splitlines(keepends=True) == by_stream([HEADER, *sent])
+    alarms = [alarm for alarm in running.alarms if alarm.code.endswith("_time")]
+    assert [alarm.code for alarm in alarms] == ["outlying_time"]
+    assert "90.2 s beside 0.199 and 0.201 s" in alarms[0].message
+
+
 def test_a_source_that_cannot_be_opened_is_refused_in_a_sentence(study, tmp_path, broker):
     port = free_port()
     addresses = {

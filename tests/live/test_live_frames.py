@@ -3,6 +3,7 @@
 import struct
 import zlib
 
+import numpy as np
 import pytest
 from wires import HEADER, by_stream, rows, until, waiting, wire
 
@@ -95,6 +96,32 @@ def test_frames_by_wire_have_the_digits_of_text(kind, study, record_map, tmp_pat
     record = read(raw, record_map)
     assert record["acc_x"].values.tolist() == [float(sent[k].split(b",")[1]) for k in kept]
     assert record["acc_x"].t[-1] - record["acc_x"].t[0] == pytest.approx(0.399)
+
+
+@pytest.mark.parametrize("bit", [26, 31])
+def test_one_wrong_bit_in_the_stamp_of_a_frame_ends_nothing(bit, study, record_map, tmp_path, request):
+    """Where no check finds it; also the bit by which the stamps seem to begin anew."""
+    record_map.write_text(MAP.replace('check = "crc-32"\ncheck_begin = 2\n', ""))
+    near, address = wire("udp", tmp_path)
+    request.addfinalizer(near.close)
+    out, raw = tmp_path / "out.csv", tmp_path / "raw.bin"
+    running = waiting(address, study, map=record_map, record=raw, to=[f"text:{out}"])
+    sent = rows(300)
+    frames = [bytearray(frame(k, line, 10_000)[:-4]) for k, line in enumerate(sent)]
+    frames[200][3 + bit // 8] ^= 1 << bit % 8
+    for each in frames:
+        near.send(bytes(each))
+    assert until(lambda: running.counts.rows == 300), running.counts
+    running.stop(wait=20.0)
+    assert (running.failure, running.counts.outlying, running.counts.lost) == ("", 1, 0)
+    (alarm,) = (alarm for alarm in running.alarms if alarm.code.endswith("_time"))
+    assert "beside 0.209 and 0.211 s" in alarm.message
+    lines = [as_text(k, line, 10_000) for k, line in enumerate(sent)]
+    lines[200] = b"9" + lines[200]
+    assert out.read_text().splitlines(keepends=True) == by_stream([HEADER, *lines])
+    record = read(raw, record_map)
+    assert [each.where for each in record.findings] == ["row 201"]
+    assert np.flatnonzero(np.isnan(record["acc_x"].t)).tolist() == [200]
 
 
 def test_a_break_within_a_frame_makes_no_frame(study, record_map, tmp_path, request, quick):

@@ -31,10 +31,10 @@ def writer(kind, path):
     return file, get_typestore(Stores.ROS2_HUMBLE), path / inside
 
 
-def imu_message(types, row, stamped=True):
+def imu_message(types, row, stamp):
     names = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "geometry_msgs/msg/Vector3")
     header, time, vector = (types[name] for name in names)
-    seconds, rest = divmod(int(STAMPS[row]), 10**9) if stamped else (0, 0)
+    seconds, rest = divmod(int(stamp), 10**9)
     first = (row,) if "seq" in header.__dataclass_fields__ else ()
     return types["sensor_msgs/msg/Imu"](
         header(*first, time(seconds, rest), "imu"),
@@ -47,7 +47,7 @@ def imu_message(types, row, stamped=True):
     )
 
 
-def recorded(kind, path, topics=("/imu/data",), stamped=True, raw=False):
+def recorded(kind, path, topics=("/imu/data",), headers=STAMPS, raw=False):
     """A bag with topics of sensor_msgs/Imu, perhaps one of a type of its own, and a topic of text."""
     file, store, result = writer(kind, path)
     store.register(get_types_from_msg(RAW, "lab/msg/Raw"))
@@ -61,7 +61,7 @@ def recorded(kind, path, topics=("/imu/data",), stamped=True, raw=False):
         for row, stamp in enumerate(STAMPS.tolist()):
             for topic, each in kinds.items():
                 if each == "sensor_msgs/msg/Imu":
-                    message = imu_message(store.types, row, stamped)
+                    message = imu_message(store.types, row, headers[row])
                 elif each == "std_msgs/msg/String":
                     message = store.types[each]("hello")
                 else:
@@ -98,9 +98,17 @@ def test_the_only_imu_topic_needs_no_map(tmp_path, kind):
     assert holds_imu(read(path, mapped(tmp_path / "guess.toml", guess_map(path))))
 
 
+@pytest.mark.parametrize("kind", ["bag", "db3", "mcap"])
+def test_a_wrong_stamp_is_set_aside(tmp_path, kind):
+    headers = STAMPS + np.where(np.arange(N) == 99, 90 * 10**9, 0)
+    record = read(recorded(kind, tmp_path, headers=headers))
+    assert [(each.code, each.where) for each in record.findings] == [("outlying_time", "row 100")]
+    assert np.flatnonzero(np.isnan(record["acc_x"].t)).tolist() == [99]
+
+
 @pytest.mark.parametrize("kind", ["bag", "mcap"])
 def test_without_header_stamps_the_times_of_recording_are_used(tmp_path, kind):
-    path = recorded(kind, tmp_path, stamped=False)
+    path = recorded(kind, tmp_path, headers=0 * STAMPS)
     record = read(path)
     assert holds_imu(record, STAMPS + DELAY)
     (finding,) = record.findings

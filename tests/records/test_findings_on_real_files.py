@@ -199,13 +199,13 @@ class TestStamps:
 
         assert said(self.stamped(tmp_path, repeat)) == {("duplicate_time", "t", "row 3001")}
 
-    @pytest.mark.parametrize(("off", "row"), [(-200_000_000, 3001), (200_000_000, 3002)])
-    def test_a_wrong_stamp_runs_backward_once(self, off, row, tmp_path):
+    @pytest.mark.parametrize("off", [-200_000_000, 200_000_000])
+    def test_a_wrong_stamp_is_set_aside(self, off, tmp_path):
         def wrong(t):
             t[3000] += off
             return t, range(len(t))
 
-        assert said(self.stamped(tmp_path, wrong)) == {("backward_time", "t", f"row {row}")}
+        assert said(self.stamped(tmp_path, wrong)) == {("outlying_time", "t", "row 3001")}
 
     def test_a_clock_set_back(self, tmp_path):
         def back(t):

@@ -142,6 +142,40 @@ def test_counters_go_on_beyond_their_range():
     assert (halves, told) == (turns, numbers.tolist())
 
 
+@for_each(
+    "counter, wanted",
+    [
+    ([10, 11, 140, 13, 14], [10, 11, -116, 13, 14]),  # the highest bit is wrong
+    ([10, 11, 137, 141, 14], [10, 11, 137, 141, 14]), ([254, 127, 0, 1], [254, 127, 256, 257]),
+    ([254, 1, 255, 252, 2, 3], [254, 257, 255, 252, 258, 259]),
+    ],
+)  # fmt: skip
+def test_one_wrong_counter_moves_no_others(counter, wanted):
+    assert Turns().on(np.array(counter, np.uint8))[1].tolist() == wanted
+
+
+@given(
+    st.lists(st.sampled_from([1, 1, 1, 2, 3, -1, 100]), max_size=60),
+    st.dictionaries(st.integers(0, 59), st.integers(0, 255), max_size=4),
+    st.integers(0, 60),
+)
+def test_each_counter_is_counted_from_the_newest(steps, wrong, cut):
+    """Value by value as a whole, and in two parts."""
+    counter = np.cumsum(steps, dtype=np.int64) % 256
+    for row, number in wrong.items():
+        counter[row : row + 1] = number
+    wanted = []
+    for each in counter.tolist():
+        newest = max(wanted, default=each)
+        wanted.append(newest + 128 - (128 - (each - newest)) % 256)
+    counter = counter.astype(np.uint8)
+    whole, numbers = Turns().on(counter)
+    assert numbers.tolist() == wanted
+    first, one = Turns().on(counter[:cut])
+    both, two = first.on(counter[cut:])
+    assert (both, [*one.tolist(), *two.tolist()]) == (whole, wanted)
+
+
 MAP = """
 [file]
 sync = "AA 55"

@@ -124,6 +124,7 @@ def test_compressed_files_are_read(tmp_path):
 )
 def test_what_is_written_reads_back_exactly(tmp_path, monkeypatch, rows, delimiter, block):
     monkeypatch.setattr(layout, "_BLOCK", block)
+    rows = [(0.1 * k, *values) for k, (_, *values) in enumerate(rows)]
     record = read(written(tmp_path / "a.csv", table(rows, delimiter)))
     assert holds_rows(record, rows)
     assert not {"bad_row", "nan", "truncated"} & set(codes(record))

@@ -389,13 +389,29 @@ def test_rows_without_a_time_are_left_out():
     assert "2 rows without a time left out" in said(found)
 
 
-@pytest.mark.parametrize(("row", "by"), [(10, 0.0), (20, -0.1), (20, -3.0)])
-def test_time_must_increase(row, by):
+@pytest.mark.parametrize(
+    ("row", "by", "code"),
+    [(10, 0.0, "duplicate_time"), (20, -0.1, "backward_time"), (20, -3.0, "backward_time")],
+)
+def test_a_row_that_is_not_later_is_left_out(row, by, code):
     def back(values, t):
         t[row] = t[row - 1] + by
         return values, t
 
-    with pytest.raises(RecordError, match=rf"t: row {row + 1} is at .* expected time to increase"):
+    found = recording_of(changed(back), STUDY)
+    assert len(found.t) == ROWS - 1
+    (finding,) = [each for each in found.findings if each.code == code and each.where == f"row {row + 1}"]
+    assert finding.message == "t: 1 row not later than those before left out"
+
+
+def test_time_must_increase():
+    def back(values, t):
+        t[20:] -= 3.0
+        return values, t
+
+    with pytest.raises(
+        RecordError, match=r"t: 1\d rows in a row from row 21 on are not later .* expected time to in"
+    ):
         recording_of(changed(back), STUDY)
 
 

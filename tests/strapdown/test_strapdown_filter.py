@@ -13,6 +13,7 @@ from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.strapdown.batch import fit
 from inercal.strapdown.error_state import filtered, measured, predicted
+from inercal.strapdown.reading import evened
 from inercal.strapdown.rests import found_rests, nodes_of
 from inercal.strapdown.simulate import simulated
 
@@ -184,3 +185,58 @@ def test_what_a_stream_does_not_take_is_said(live, tmp_path, capsys):
     )
     assert "a step of 0.42 s after row 299 where 0.02 s is usual" in capsys.readouterr().err
     assert run(["calibrate", "strapdown", "--study", study]) == 2
+
+
+#: a leap ahead, one out of order, one between its neighbours, the first ones and the last
+WRONG = [(1500, 97.0), (1500, 2.0), (1500, 30.035), (0, 97.0), (1, 97.02), (-1, 999.0)]
+
+
+@pytest.mark.parametrize(("row", "t"), WRONG)
+def test_a_row_whose_stamp_is_wrong_stands_in_its_place(row, t, live, tmp_path, capsys):
+    """A stream gives the lines of sound stamps; but without its first row, which has no place yet."""
+    study, record = live
+    titles, *lines = Path(record).read_bytes().splitlines(keepends=True)
+    wrong = [*lines]
+    wrong[row] = b"%r" % t + lines[row][lines[row].index(b",") :]
+    found = []
+    for name, each in (("sound", lines[1 + row :] if row in (0, 1) else lines), ("wrong", wrong)):
+        (tmp_path / f"{name}.csv").write_bytes(b"".join([titles, *each]))
+        capsys.readouterr()
+        command = ["calibrate", "strapdown", str(tmp_path / f"{name}.csv"), "--study", study, "--stream"]
+        assert run(command) == 0
+        found.append(capsys.readouterr())
+    assert found[0].out.count("\n") > 5
+    assert found[1].out == found[0].out
+    assert found[1].err.count("outlying_time") == 1
+
+
+@pytest.mark.parametrize(("row", "t"), WRONG)
+def test_stamps_of_a_file_are_put_on_the_steps_of_those_beside(row, t, live):
+    record = ic.read(live[1])
+    column = record["gyro_x"]
+    stamps = column.t.copy()
+    stamps[row] = t
+    found = evened(ic.record({"t [s]": stamps, "gyro_x [rad/s]": column.values}))
+    np.testing.assert_allclose(found["gyro_x"].t, column.t, atol=1e-9)
+    (finding,) = (each for each in found.findings if each.code == "outlying_time")
+    assert finding.where == f"row {row % len(stamps) + 1}"
+
+
+@pytest.mark.parametrize("change", ["none", "gap", "two gaps", "jitter", "drift"])
+def test_sound_stamps_stay(change):
+    """Whatever the calibration then says of them."""
+    t = 0.02 * np.arange(3000)
+    match change:
+        case "gap":
+            t[1000:] += 0.4
+        case "two gaps":
+            t[1000:] += 0.4
+            t[1001:] += 7.0
+        case "jitter":
+            t += np.random.default_rng(4).uniform(-0.0049, 0.0049, len(t))
+        case "drift":
+            t *= 1.0 + 1e-5 * np.arange(len(t)) / len(t)
+    record = ic.record(t=t, gyro_x=np.sin(t))
+    found = evened(record)
+    assert found["gyro_x"].t.tobytes() == t.tobytes()
+    assert found.findings == record.findings

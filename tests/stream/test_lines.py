@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from inercal.errors import InputError, MapError, RecordError
 from inercal.records.maps import read_map
 from inercal.records.read import read
+from inercal.stream.doubt import Doubt, HeldRows
 from inercal.stream.lines import Lines
 from rows import for_each
 
@@ -50,9 +51,12 @@ def samples(data, record_map=None):
     lines = Lines(
         io.BytesIO(data if isinstance(data, bytes) else data.encode()), "stdin", record_map, said.append
     )
-    found = []
+    found, doubt, count = [], Doubt.of(HeldRows()), 0
     while (line := lines.next()) is not None:
-        found.append(lines.sample(line, len(found)))
+        doubt, decided = doubt.on(lines.sample(line, count), line.number, lines)
+        found += decided
+        count += 1
+    found += doubt.end(lines)
     lines.close()
     return found, said, lines
 

@@ -17,6 +17,7 @@ from inercal.records.channels import is_channel, misfit, nearest, needs_unit
 from inercal.records.checks import check
 from inercal.records.column import Column
 from inercal.records.record import Record
+from inercal.records.stamps import with_sound_stamps
 from inercal.records.titles import name_and_unit
 from inercal.units import Unit, parse_quantity, parse_unit
 
@@ -166,7 +167,8 @@ def record(
         raise RecordError(
             "record", f"label: found {len(labels)} texts, expected {len(axis)} as there are rows"
         )
-    return Record(made, check(made), (GIVEN,), labels)
+    made, of_time = with_sound_stamps(made)
+    return Record(made, (*of_time, *check(made)), (GIVEN,), labels)
 
 
 def _of_table(table: Any) -> Iterator[tuple[str, ArrayLike, str | None]]:
@@ -210,7 +212,9 @@ def _of_dataset(table: Any, units: Mapping[str, str]) -> Record:
         raise RecordError(
             "record", f"found the variables {', '.join(map(str, table.data_vars))}, expected channels"
         )
-    return Record(made, check(made), tuple(dict.fromkeys(column.source for column in made.values())))
+    made, of_time = with_sound_stamps(made)
+    sources = tuple(dict.fromkeys(column.source for column in made.values()))
+    return Record(made, (*of_time, *check(made)), sources)
 
 
 def _is_triad(name: str) -> bool:

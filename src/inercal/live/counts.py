@@ -31,7 +31,8 @@ class Counts:
 
     ``received`` bytes are ``used`` in rows, ``left_out`` (in no whole or sound row), ``dropped`` for want of room, or
     still ``waiting``. Of ``rows``, ``lost`` are missing by their counter or their stamps, ``disordered`` came after a
-    later one, ``repeated`` have the stamp of another, ``late`` came 0.25 s later than the quickest of the last minute.
+    later one, ``repeated`` have the stamp of another, ``outlying`` a wrong one, ``late`` came 0.25 s later than the
+    quickest of the last minute.
     ``cut`` rows were begun or ended at a join, ``damaged`` frames have a wrong check. ``step_median`` and ``step_p99``
     [s] are the estimator's own time for a row.
     """
@@ -45,6 +46,7 @@ class Counts:
     lost: int
     disordered: int
     repeated: int
+    outlying: int
     late: int
     cut: int
     damaged: int
@@ -58,10 +60,10 @@ class Counts:
         """The counts in one line."""
         parts = [f"{self.rows} rows"]
         named = {
-            "lost": self.lost, "out of order": self.disordered, "repeated": self.repeated, "late": self.late,
-            "cut at joins": self.cut, "frames damaged": self.damaged, "datagrams dropped by the system":
-            self.datagrams_lost, "bytes in no row": self.left_out, "bytes dropped": self.dropped,
-            "reconnections": self.reconnections,
+            "lost": self.lost, "out of order": self.disordered, "repeated": self.repeated,
+            "with a wrong stamp": self.outlying, "late": self.late, "cut at joins": self.cut,
+            "frames damaged": self.damaged, "datagrams dropped by the system": self.datagrams_lost,
+            "bytes in no row": self.left_out, "bytes dropped": self.dropped, "reconnections": self.reconnections,
         }  # fmt: skip
         parts += [f"{count} {name}" for name, count in named.items() if count]
         for name, sink in self.sinks.items():
@@ -79,10 +81,11 @@ class Stamps:
     """Judges the order of time stamps, row by row."""
 
     def __init__(self) -> None:
-        self.lost = self.disordered = self.repeated = self.late = 0
+        self.lost = self.disordered = self.repeated = self.outlying = self.late = 0
         self._newest = -math.inf
         self._steps: deque[float] = deque(maxlen=_STEPS)
         self._interval, self._rows = math.nan, 0
+        self._aside = 0
         self._least = [math.inf, math.inf]
         self._since = math.nan
 
@@ -99,7 +102,8 @@ class Stamps:
                 self.lost -= 1  # it was not lost, only late
         elif math.isfinite(step):
             self._rows += 1
-            self.lost += self._missing(step)
+            self.lost += max(self._missing(step) - self._aside, 0)
+            self._aside = 0
             self._steps.append(step)
             if len(self._steps) == _STEPS and self._rows % _STEPS == 0:
                 first, self._interval = math.isnan(self._interval), statistics.median(self._steps)
@@ -108,6 +112,11 @@ class Stamps:
         self._newest = max(self._newest, t)
         if arrived is not None:
             self._timed(arrived - t, arrived)
+
+    def set_aside(self) -> None:
+        """Take a row whose stamp is wrong: it is not missing from the step of those beside it."""
+        self.outlying += 1
+        self._aside += 1
 
     def _missing(self, step: float) -> int:
         """Rows that are missing in a step [s], once the interval is known."""

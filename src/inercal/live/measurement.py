@@ -174,6 +174,7 @@ class Measurement:
             lost=stamps.lost if missing is None else missing,
             disordered=stamps.disordered,
             repeated=stamps.repeated,
+            outlying=stamps.outlying,
             late=stamps.late,
             cut=0 if feed is None else feed.cut,
             damaged=0 if feed is None else feed.damaged,

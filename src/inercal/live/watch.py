@@ -59,7 +59,10 @@ class Watch:
         if self._replayed:
             self._wait(sample.t)
         self.rows += 1
-        self.stamps.on(sample.t, None if self._replayed else arrived)
+        if sample.wrong:
+            self.stamps.set_aside()
+        else:
+            self.stamps.on(sample.t, None if self._replayed else arrived)
         self._sample = sample
 
     def _wait(self, t: float) -> None:

@@ -72,7 +72,8 @@ class Triad:
     @cached_property
     def rate(self) -> float:
         """Median sample rate [Hz]; NaN where the stamps do not increase."""
-        step = float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0
+        t = self.t[np.isfinite(self.t)]
+        step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
         return 1.0 / step if step > 0 else float("nan")
 
 

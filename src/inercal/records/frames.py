@@ -88,30 +88,36 @@ def frames_in(data: bytes, frame: Frame) -> Found:
 
 
 class Turns(NamedTuple):
-    """The last value of a counter that begins anew at 2^bits, -1 before the first; how often it has; the ``newest``
-    value as if it never did, and how many before that are ``missing``."""
+    """The ``newest`` value of a counter that begins anew at 2^bits, as if it never did, -1 before the first; and how
+    many before that are ``missing``."""
 
-    last: int = -1
-    turns: int = 0
     newest: int = -1
     missing: int = 0
 
     def on(self, values: NDArray[Any]) -> tuple[Turns, NDArray[np.int64]]:
         """After more values (n,) of an unsigned type: how the counter stands, and the values as if it never began
-        anew. A step of more than half its range is one of less than half the other way, out of order."""
+        anew. Each is within half the range of the newest before it, for one out of order may be wrong."""
         bits = 8 * values.dtype.itemsize
         numbers = values.astype(np.int64)
         if not len(numbers) or bits > 32:
             return self, numbers
-        before = np.concatenate([[numbers[0] if self.last < 0 else self.last], numbers[:-1]])
         half = 1 << (bits - 1)
-        steps = numbers - before
-        turns = self.turns + np.cumsum((steps < -half).astype(np.int64) - (steps > half))
-        last, numbers = int(numbers[-1]), numbers + (turns << bits)
-        newest = np.maximum.accumulate([numbers[0] - 1 if self.last < 0 else self.newest, *numbers])
+        begin = numbers[0] - 1 if self.newest < 0 else self.newest
+        steps = half - (half - np.diff(numbers, prepend=begin)) % (2 * half)
+        numbers = begin + np.cumsum(steps)
+        row = 0
+        for first in np.flatnonzero(steps < 0).tolist():
+            if first < row:
+                continue
+            row, newest = first, numbers[first - 1] if first else begin
+            while row < len(numbers) and numbers[row] < newest:
+                if off := (newest - half - numbers[row]) // (2 * half) + 1:
+                    numbers[row:] += 2 * half * off
+                row += numbers[row] < newest
+        newest = np.maximum.accumulate(np.concatenate([[begin], numbers]))
         gained = np.diff(newest)
         missing = int(np.sum(gained[gained > 0] - 1)) - int(np.sum(numbers < newest[:-1]))
-        return Turns(last, int(turns[-1]), int(newest[-1]), self.missing + missing), numbers
+        return Turns(int(newest[-1]), self.missing + missing), numbers
 
 
 def _bytes(kind: str) -> int:

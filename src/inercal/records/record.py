@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 class Record:
     """Columns by name, in the order read, with what was found suspicious while reading.
 
-    Reading never drops, sorts or interpolates: rows that could not be read stand as NaN and are listed in
-    ``findings``. Columns of files with different clocks keep their own time axes. ``labels`` holds the text
-    of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is, as
-    ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
+    Reading never drops, sorts or interpolates: rows that could not be read, and stamps that are wrong, stand as NaN
+    and are listed in ``findings``. Columns of files with different clocks keep their own time axes. ``labels`` holds
+    the text of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is,
+    as ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
     uncertainty of a sample rate that was typed, 0 if it had none; None where stamps are the clock.
     """
 
@@ -48,7 +48,8 @@ class Record:
             own = [each for each in self.columns.values() if time.of_column[each.name] == name]
             titles = ", ".join(f"{each.name} [{each.unit.symbol}]" for each in own[:9])
             more = ", ..." if len(own) > 9 else ""
-            lasts = f" over {float(t[-1] - t[0]):.6g} s" if len(t) else ""
+            known = t[np.isfinite(t)]
+            lasts = f" over {float(known[-1] - known[0]):.6g} s" if len(known) else ""
             lines.append(f"  {titles}{more}: {counted(len(t), 'row')}{lasts}")
         if len(lines) > 7:
             lines = [*lines[:7], f"  ... {len(lines) - 7} clocks more"]

@@ -25,6 +25,9 @@ class Limits:
     least_rows: int = 10
     """Rows at least of a recording."""
 
+    late_rows: int = 10
+    """Successive rows without a later stamp from which time stands still or was set back; fewer are left out."""
+
     most_rows: int = 5_000_000
     """Rows of a plan that fit into memory with all that is computed from them."""
 

@@ -42,8 +42,8 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
     attitude, ``q_ref_0..3``. A rate belongs to the interval from its row to the next, one recorded as an increment to
     the interval before; the last row's rate (or the first increment) is not used.
 
-    Raises RecordError for columns that are missing or on different clocks, time that does not increase, fewer than
-    `LIMITS.least_rows` rows, no accelerometers, or units of rates and angles that contradict each other.
+    Raises RecordError for columns that are missing or on different clocks, time that stands still or was set back,
+    fewer than `LIMITS.least_rows` rows, no accelerometers, or units of rates and angles that contradict each other.
     """
     where = record.sources[0].path if record.sources else "record"
     sensor, unread = _rate_sensor(record, settings, where), as_recorded(record, settings).fixed
@@ -68,8 +68,9 @@ def recording_of(record: Record, settings: SelfcalSettings) -> Recording:
         raise RecordError(where, "acc_x, acc_y, acc_z hold no number, expected specific force in m/s^2 or g")
     time = columns[0].t
     rows, findings = _used_rows(time, th, rate, where)
+    rows, late = _increasing(time, rows, where)
+    findings += late
     t, rate, th, acc = time[rows], rate[rows[:-1]], th[rows], acc[rows]
-    _increasing(t, rows, where)
     findings += _lacking(rate, rows, sensor)
     findings += _gaps(t, record)
     th, turned = _continuous(th)
@@ -216,17 +217,26 @@ def _used_rows(t: Array, th: Array, rate: Array, where: str) -> tuple[NDArray[np
     return rows, findings
 
 
-def _increasing(t: Array, rows: NDArray[np.int64], where: str) -> None:
-    """Refuse time that stands still or runs backward."""
-    wrong = np.flatnonzero(np.diff(t) <= 0.0)
-    if wrong.size:
-        k = int(wrong[0])
-        more = f" and {wrong.size - 1} more" if wrong.size > 1 else ""
+def _increasing(time: Array, rows: NDArray[np.int64], where: str) -> tuple[NDArray[np.int64], list[Finding]]:
+    """Those of the rows that are later than all before them; refused where so many in a row are not that time stands
+    still, or the clock was set back."""
+    t = time[rows]
+    taken = np.flatnonzero(t > np.concatenate([[-np.inf], np.maximum.accumulate(t)[:-1]]))
+    if len(taken) == len(t):
+        return rows, []
+    late = np.diff(np.append(taken, len(t))) - 1
+    if late.max() >= LIMITS.late_rows:
+        k = int(np.argmax(late))
         raise RecordError(
             where,
-            f"t: row {rows[k + 1] + 1} is at {t[k + 1]:.10g} s after {t[k]:.10g} s{more}, expected time to increase "
+            f"t: {late[k]} rows in a row from row {rows[taken[k] + 1] + 1} on are not later than {t[taken[k]]:.10g} s, "
+            "expected time to increase "
             '(a map with ignore = true and rate = "5 Hz" under [time] does without stamps)',
         )
+    left = np.delete(rows, taken)
+    text = f"t: {counted(left.size, 'row')} not later than those before left out"
+    code = "backward_time" if (np.diff(t) < 0.0).any() else "duplicate_time"
+    return rows[taken], [Finding(code, text, places("row", left + 1))]
 
 
 def _lacking(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]:

@@ -13,6 +13,9 @@ class Limits:
     uneven: float = 0.5
     """Part of the sample interval by which a step of time may differ from it."""
 
+    fewest_stamps: int = 8
+    """Stamps that tell the sample interval, without which none is put right."""
+
     window: float = 0.5
     """Window [s] in which rate and force must be still at a rest."""
 

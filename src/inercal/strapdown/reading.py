@@ -2,15 +2,71 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.errors import RecordError
+from inercal.findings import Finding
 from inercal.records.column import Triad
+from inercal.records.places import counted, places
 from inercal.records.record import Record
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.samples import Samples
 from inercal.units import RAW
+
+
+def evened(record: Record) -> Record:
+    """The record, with stamps on the even steps of their neighbours where single ones were set aside, or are off them.
+
+    A sample whose stamp is wrong stands where it was taken: between those before and after it.
+    """
+    columns, findings = dict(record.columns), list(record.findings)
+    for t in {id(column.t): column.t for column in columns.values()}.values():
+        even, off = _even(t)
+        for name in (name for name, column in columns.items() if column.t is t):
+            columns[name] = replace(columns[name], t=even)
+        if off.size:
+            text = (
+                f"t: {counted(off.size, 'stamp')} off the even steps of those beside, which are taken instead"
+            )
+            findings.append(Finding("outlying_time", text, places("row", off + 1)))
+    return replace(record, columns=columns, findings=tuple(findings))
+
+
+def _even(t: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Stamps (n,) [s] with the missing ones, and single ones off the steps, as those beside say; rows of the latter."""
+    known = np.flatnonzero(np.isfinite(t))
+    if len(known) < LIMITS.fewest_stamps:
+        return t, known[:0]
+    usual = float(np.median(np.diff(t[known])))
+    if not usual > 0.0 or (len(known) == len(t) and not _uneven(np.diff(t), usual).any()):
+        return t, known[:0]
+    rows = np.arange(len(t))
+    even = np.interp(rows, known, t[known])
+    even += usual * (np.minimum(rows - known[0], 0) + np.maximum(rows - known[-1], 0))
+    off = []
+    for k in np.flatnonzero(_uneven(np.diff(even), usual)).tolist():
+        for row in (k, k + 1):
+            before, after = (
+                even[row + step] - step * usual if 0 <= row + step < len(t) else None for step in (-1, 1)
+            )
+            beside = [each for each in (before, after) if each is not None]
+            apart = abs(beside[0] - beside[-1])
+            # off both steps, between two that are not; at an end off its one step
+            if apart <= LIMITS.uneven * usual and all(
+                abs(even[row] - each) > LIMITS.uneven * usual for each in beside
+            ):
+                even[row] = sum(beside) / len(beside)
+                off.append(row)
+    return even, np.array(off, dtype=np.int64)
+
+
+def _uneven(step: Array, usual: float) -> NDArray[np.bool_]:
+    """Steps (n,) [s] that differ too much from the ``usual`` one."""
+    return np.asarray(np.abs(step - usual) > LIMITS.uneven * usual)
 
 
 def samples_of(record: Record) -> Samples:

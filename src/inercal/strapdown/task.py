@@ -16,7 +16,7 @@ from inercal.strapdown.batch import Fit, fit
 from inercal.strapdown.error_state import filtered
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.outcome import assemble, failed, too_few, useless
-from inercal.strapdown.reading import samples_of
+from inercal.strapdown.reading import evened, samples_of
 from inercal.strapdown.restricted import with_noise_shown
 from inercal.strapdown.rests import found_rests, mean_force, nodes_of
 from inercal.strapdown.samples import Samples
@@ -60,6 +60,7 @@ def calibrate(
         The rests that the study lists do not fit it.
     """
     clock = time.perf_counter()
+    record = evened(record)
     samples = samples_of(record)
     if record.rate_u and not settings.time_base_u:
         settings = replace(settings, time_base_u=record.rate_u)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, NamedTuple
@@ -25,6 +25,7 @@ from inercal.records.read.layout import Layout, comment_marks, find_layout, is_r
 from inercal.records.read.table import Part, Table
 from inercal.records.read.text import UNENDED, contents, locate
 from inercal.records.record import Record
+from inercal.records.stamps import beside
 
 if TYPE_CHECKING:
     from inercal.records.maps import RecordMap
@@ -52,12 +53,14 @@ class Line(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """A row: its number from 0, its time [s], the values in the order of the record's columns, and its label."""
+    """A row: its number from 0, its time [s], the values in the order of the record's columns, and its label;
+    ``wrong``: it had a time, which is NaN for it was wrong."""
 
     row: int
     t: float
     values: list[float]
     label: str
+    wrong: bool = False
 
 
 class _Field(NamedTuple):
@@ -93,8 +96,8 @@ class Lines:
         The columns of one file. Increments need its ``[time] rate``, for the median interval of a stream is
         not known before its end.
     say : callable
-        Told of rows and values that could not be read, and of stamps that repeat or run backward: the first
-        few of a kind as they come, the number of all others by `close`.
+        Told of rows and values that could not be read, and of stamps that are wrong, repeat or run backward: the
+        first few of a kind as they come, the number of all others by `close`.
 
     Raises
     ------
@@ -112,7 +115,7 @@ class Lines:
         self._t, self._odd = math.nan, ""
         self._first: Collection[str] = ()
         self._last: Collection[str] = ()
-        self._waiting: list[tuple[str, Line]] = []
+        self._waiting: list[tuple[str, int]] = []
         self._form, self._held = self._begin(record_map)
         self._layout = self._form.layout
         own = [*self._form.fields, *([] if self._form.time is None else [self._form.time])]
@@ -174,11 +177,13 @@ class Lines:
             for field, value in zip(form.fields, numbers, strict=True):
                 if value is not None and is_rounded(fields[field.column], value):
                     self._flaw(
-                        "resolution", f"{field.name}: whole number beyond 2^53, rounded to 53 bits", line
+                        "resolution",
+                        f"{field.name}: whole number beyond 2^53, rounded to 53 bits",
+                        line.number,
                     )
             stamp = 0.0 if form.time is None else self._layout.number(fields[form.time.column])
             bad = stamp is None or None in numbers
-            t = self._stamp(form.time, stamp, bad, line) if form.time is not None else t
+            t = self._value(form.time, stamp, bad, line) if form.time is not None else t
             values = [
                 self._value(field, value, bad or (row == 0 and field.name in self._first), line)
                 for field, value in zip(form.fields, numbers, strict=True)
@@ -186,9 +191,24 @@ class Lines:
         if bad:
             self._bad_row(line)
         elif not line.whole and fields is not None and self._layout.width - 1 in self._columns:
-            self._flaw("truncated", f"{UNENDED} may be cut", line)
+            self._flaw("truncated", f"{UNENDED} may be cut", line.number)
         label = fields[form.label].strip() if fields is not None and form.label is not None else ""
         return Sample(row, row / form.rate if form.time is None else t, values, label)
+
+    def say_order(self, t: float, line: int) -> None:
+        """Say of a sound stamp [s] that it runs backward; of stamps that repeat the first is said."""
+        if math.isnan(t):
+            return
+        odd = "duplicate_time" if t == self._t else "backward_time" if t < self._t else ""
+        if odd == "backward_time":
+            self._flaw(odd, "t: backward stamp", line)
+        elif odd and odd != self._odd:
+            self._flaw(odd, "t: repeated stamp", line)
+        self._t, self._odd = t, odd
+
+    def say_wrong(self, t: float, neighbours: Sequence[float], line: int) -> None:
+        """Say that a stamp [s] is wrong, as the sound ones beside it show."""
+        self._flaw("outlying_time", "t: wrong stamp set aside", line, f": {beside(t, neighbours)}")
 
     def close(self) -> None:
         """Give the number of findings that were left unsaid."""
@@ -196,28 +216,15 @@ class Lines:
             if count > _SAID:
                 self._say(Finding(code, f"{text}: {count - _SAID} more"))
 
-    def _stamp(self, field: _Field, value: float | None, bad: bool, line: Line) -> float:
-        """A time stamp [s]; the first of some that repeat is said, and each that runs backward."""
-        t = self._value(field, value, bad, line)
-        if math.isnan(t):
-            return t
-        odd = "duplicate_time" if t == self._t else "backward_time" if t < self._t else ""
-        if odd == "backward_time":
-            self._flaw(odd, "t: backward stamp", line)
-        elif odd and odd != self._odd:
-            self._flaw(odd, "t: repeated stamp", line)
-        self._t, self._odd = t, odd
-        return t
-
     def _value(self, field: _Field, value: float | None, silent: bool, line: Line) -> float:
         """A value in its unit; NaN where there is none, which is said unless ``silent``."""
         if value is None or not math.isfinite(value):
             text = f"{field.name}: missing value"
             silent = silent or may_be_empty(field.name)
             if field.name in self._last and not silent:
-                self._waiting.append((text, line))
+                self._waiting.append((text, line.number))
             elif not silent:
-                self._flaw("nan", text, line)
+                self._flaw("nan", text, line.number)
             return math.nan
         for factor in field.factors:
             value *= factor
@@ -227,15 +234,15 @@ class Lines:
         """Say that a row could not be read."""
         if line.whole:
             text = f"row other than {self._layout.width} fields with numbers, left as NaN"
-            self._flaw("bad_row", text, line)
+            self._flaw("bad_row", text, line.number)
         else:
-            self._flaw("truncated", "the stream ends within a row", line)
+            self._flaw("truncated", "the stream ends within a row", line.number)
 
-    def _flaw(self, code: str, text: str, line: Line) -> None:
-        """Give a finding on a line, unless it has been given too often."""
+    def _flaw(self, code: str, text: str, line: int, more: str = "") -> None:
+        """Give a finding on the line of a number, unless it has been given too often."""
         self._flaws[code, text] += 1
         if self._flaws[code, text] <= _SAID:
-            self._say(Finding(code, text, f"line {line.number}"))
+            self._say(Finding(code, f"{text}{more}", f"line {line}"))
 
     def _read(self) -> Line | None:
         """The next line of any content."""

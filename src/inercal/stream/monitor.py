@@ -62,7 +62,8 @@ class Monitor:
     deviation in the window, random walk N with its standard uncertainty, and the Allan deviation at tau. N is
     read at the octave nearest to 1 s. Unknown values are empty.
 
-    Time stamps and values that are missing, stamps that run backward, and gaps of half a window end a rest.
+    Time stamps and values that are missing, stamps that run backward, and gaps of half a window end a rest. A row
+    whose stamp is wrong is left out.
 
     Parameters
     ----------
@@ -113,6 +114,8 @@ class Monitor:
 
     def step(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Sequence[Output]]:
         """The state after a sample, and a line where one is due."""
+        if sample.wrong:
+            return state, ([self._line(state, math.nan)] if self._every == 0.0 else ())
         timed = state.interval > 0.0
         state = self._watched(state, sample) if timed else self._timed(state, sample.t)
         slots = state.slots.at(sample.t, self._every)

@@ -12,8 +12,9 @@ A state is saved only after the lines of all rows in it have been taken by the r
 since the last save are given once more after the run has been killed. A last row whose line has not ended is
 answered, but not kept in the state, for it may not have been whole.
 
-An estimator may hold rows, which then are in its state, until it knows more. Their lines are given at the end of the
-stream; a run that goes on from there gives them once more, as they are where rows follow.
+A row whose stamp does not go on is held until later ones decide whether it is wrong (`inercal.stream.doubt`), and an
+estimator may hold rows, which then are in its state, until it knows more. Their lines are given at the end of
+the stream; a run that goes on from there gives them once more, as they are where rows follow.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from inercal.estimate.checkpoint import alone, fingerprint, load, save
 from inercal.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.records.places import counted
 from inercal.records.write import number
+from inercal.stream.doubt import Doubt, HeldRows
 from inercal.stream.lines import Line, Lines, Sample
 
 S = TypeVar("S")
@@ -139,7 +141,7 @@ class Saving:
 
 
 class _Position(NamedTuple):
-    """Rows that a state has seen: their number, CRC-32 of each of the first and of all, and the last time stamp [s]."""
+    """Rows that a state has seen: their number, CRC-32 of each of the first and of all, and the last sound stamp."""
 
     rows: int = 0
     head: NDArray[np.int64] = np.empty(0, np.int64)
@@ -154,9 +156,10 @@ class _Position(NamedTuple):
 
 
 class _Whole(NamedTuple):
-    """A saved state with its position."""
+    """A saved state with its position, and the rows in doubt."""
 
     position: _Position
+    doubt: HeldRows
     state: Any
 
 
@@ -211,22 +214,28 @@ def _run(
     """As `run`, with the checkpoint to itself."""
     enough = estimator.enough if isinstance(estimator, Sufficient) else _never
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
-    whole = _Whole(_Position(), estimator.initial())
+    whole = _Whole(_Position(), HeldRows(), estimator.initial())
     if saving is not None and saving.path.exists():
         whole = load(saving.path, estimator.kind, mark, whole)
         say(f"resumed after row {whole.position.rows} of {saving.path}")
-    (position, state), saved = whole, whole.position.rows
+    position, state, doubt, saved = whole.position, whole.state, Doubt.of(whole.doubt), whole.position.rows
 
     def keep(least: int = 1) -> None:
         nonlocal saved
         if saving is not None and position.rows - saved >= least:
             saving.before()
-            save(saving.path, estimator.kind, mark, _Whole(position, state))
+            save(saving.path, estimator.kind, mark, _Whole(position, doubt.saved, state))
             saved = position.rows
 
     def give(outputs: Sequence[Output]) -> None:
         for output in (each for each in outputs if not _given(each, after)):
             write(",".join(each if isinstance(each, str) else number(each) for each in output))
+
+    def step(samples: Sequence[Sample]) -> None:
+        nonlocal state
+        for sample in samples:
+            state, outputs = estimator.step(state, sample)
+            give(outputs)
 
     give([estimator.columns])
     if words := enough(state):
@@ -234,13 +243,13 @@ def _run(
         return position.rows
     with closing(lines), _interrupts() as interrupts:
         try:
-            for line, sample in _new_samples(lines, position, interrupts, say):
+            for line, sample, again in _new_samples(lines, position, interrupts, say):
                 if not line.whole:
                     keep()
-                state, outputs = estimator.step(state, sample)
-                give(outputs)
+                doubt, decided = (doubt.without_held() if again else doubt).on(sample, line.number, lines)
+                step(decided)
                 if line.whole:
-                    position = position.after(line, sample.t)
+                    position = position.after(line, doubt.order.last if lines.stamped else sample.t)
                     keep(1 if saving is None else saving.every)
                 if words := enough(state):
                     say(words)
@@ -250,6 +259,7 @@ def _run(
                 keep()
             raise
         keep()
+        step(doubt.end(lines))
         give(estimator.finish(state))
     return position.rows
 
@@ -261,8 +271,13 @@ def _given(output: Output, after: float) -> bool:
 
 def _new_samples(
     lines: Lines, position: _Position, interrupts: _Interrupts, say: Callable[[str], None]
-) -> Iterator[tuple[Line, Sample]]:
-    """The rows that are not in a position yet; raises `RecordError` where they are not those that follow it."""
+) -> Iterator[tuple[Line, Sample, bool]]:
+    """The rows that are not in a position yet, and of the first whether rows before it were passed over by stamps;
+    raises `RecordError` where they are not those that follow it.
+
+    A row that is later than the position, or has no time, waits for the next but one that has: a wrong stamp among
+    those passed over does not end that.
+    """
     rows, row = iter(lambda: interrupts.next(lines), None), position.rows
     passed, earlier = math.nan, 0
     if row:
@@ -275,18 +290,29 @@ def _new_samples(
             say(f"rows up to t = {passed} s are passed over")
         else:
             say("the stream goes on, no row is passed over")
+    later: list[tuple[Line, Sample]] = []
     for line in rows:
-        sample = lines.sample(line, row)
+        sample = lines.sample(line, row + len(later))
         if sample.t <= passed:
-            earlier += 1
+            earlier += 1 + len(later)
+            later.clear()
             continue
+        later.append((line, sample))
         if not math.isnan(passed):
+            if sum(math.isfinite(each.t) for _, each in later) < 2:
+                continue
             say(f"{counted(earlier, 'row')} passed over")
+        again = earlier > 0 and not math.isnan(passed)
         passed = math.nan
-        row += 1
-        yield line, sample
+        for k, each in enumerate(later):
+            yield *each, again and k == 0
+        row += len(later)
+        later.clear()
     if not math.isnan(passed):
-        say(f"the stream ended after {counted(earlier, 'row')}, all passed over")
+        over = f"{counted(earlier, 'row')} passed over"
+        say(over if later else f"the stream ended after {counted(earlier, 'row')}, all passed over")
+        for k, each in enumerate(later):
+            yield *each, earlier > 0 and k == 0
 
 
 def _begins_alike(rows: Iterator[Line], position: _Position, stamped: bool) -> tuple[bool, list[Line]]:

@@ -4,8 +4,8 @@ A recursive filter of `inercal.selfcal` goes on by one row at a time, to the dig
 Where a file takes a second pass, a stream goes through all its rows again each time that they have doubled, up to
 `LIMITS.kept_rows` (`inercal.selfcal.filters.second_pass`). Rows are taken as `inercal.selfcal.reading` says: the first
 row with all angles and a rate is the start; where no rate is recorded the platform is taken to turn on as before
-(`inercal.selfcal.filters.gaps`); other missing values are not measured. Only time is treated more kindly: a row that is
-not later than the one before is left out.
+(`inercal.selfcal.filters.gaps`); other missing values are not measured. A row that
+is not later than the one before is left out.
 """
 
 from __future__ import annotations
@@ -41,7 +41,6 @@ _SETTLED = 50
 """Rows before which that is not judged."""
 
 _SAID = 5
-_PATIENCE = 10
 
 
 class SelfcalState(NamedTuple):
@@ -239,11 +238,11 @@ class Selfcal:
 
     def _late(self, state: SelfcalState, t: float) -> SelfcalState:
         """A row left out, which is not later than the one before."""
-        if state.late + 1 == _PATIENCE:
+        if state.late + 1 == LIMITS.late_rows:
             raise RecordError(
                 self._where,
-                f"t: {_PATIENCE} rows in a row are not later than {state.t:.10g} s, the last at {t:.10g} s, expected "
-                "time to increase",
+                f"t: {LIMITS.late_rows} rows in a row are not later than {state.t:.10g} s, the last at {t:.10g} s, "
+                "expected time to increase",
             )
         return state._replace(late=state.late + 1)
 

@@ -29,6 +29,8 @@ from inercal.stream.run import Output
 _HEAD = 51
 """Rows that tell the interval of the samples, before anything is looked for."""
 
+_SAID = 5
+
 _CHECK = 1.0
 """Time [s] from one look for the end of a rest to the next."""
 
@@ -36,7 +38,8 @@ _CHECK = 1.0
 class StrapdownState(NamedTuple):
     """State after a row: ``rows`` (capacity, 7), of which ``filled`` are in use, with stamp, rate and force in SI;
     first and last sample of the ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,)
-    after the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said."""
+    after the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said; ``off``:
+    the last stamp was off the even steps, on which it was put; ``told`` such rows were said."""
 
     rows: Array
     filled: int
@@ -45,6 +48,8 @@ class StrapdownState(NamedTuple):
     q: Array
     checked: int
     failed: bool
+    off: bool
+    told: int
 
 
 class Strapdown:
@@ -81,19 +86,24 @@ class Strapdown:
 
     def initial(self) -> StrapdownState:
         """No row seen."""
-        return StrapdownState(
-            np.empty((1024, 7)), 0, np.empty((0, 2)), np.full(SIZE, math.nan), np.full(4, math.nan), 0, False
-        )
+        c, q = np.full(SIZE, math.nan), np.full(4, math.nan)
+        return StrapdownState(np.empty((1024, 7)), 0, np.empty((0, 2)), c, q, 0, False, False, 0)
 
     def step(self, state: StrapdownState, sample: Sample) -> tuple[StrapdownState, Sequence[Output]]:
         """The state after a row, and a line where a rest has ended."""
         values = np.array([sample.values[i] for i in self._places]) * self._factors
         rows, count = state.rows, state.filled
-        self._refuse(rows, count, sample, values)
+        if math.isnan(sample.t) and count < 2:
+            return state._replace(filled=0), ()  # nothing says when it was
+        t, off = self._stamp(state, sample, values)
+        if off and not math.isnan(sample.t) and state.told < _SAID:
+            text = f"t: {sample.t:.10g} s is off the even steps, on which {t:.10g} s is taken"
+            self._say(Finding("outlying_time", text, f"row {count + 1}"))
+            state = state._replace(told=state.told + 1)
         if count == len(rows):
             rows = np.concatenate([rows, np.empty_like(rows)])
-        rows[count, 0], rows[count, 1:] = sample.t, values
-        state = state._replace(rows=rows, filled=count + 1)
+        rows[count, 0], rows[count, 1:] = t, values
+        state = state._replace(rows=rows, filled=count + 1, off=off)
         if state.filled < _HEAD or (state.filled - state.checked) * self._ts(state) < _CHECK:
             return state, ()
         return self._looked(state._replace(checked=state.filled), ended=False)
@@ -102,19 +112,28 @@ class Strapdown:
         """The line of the last rest."""
         return self._looked(state, ended=True)[1] if state.filled >= _HEAD else ()
 
-    def _refuse(self, rows: Array, count: int, sample: Sample, values: Array) -> None:
-        """Refuse a gap, and what is no number: a solution is carried through every sample."""
+    def _stamp(self, state: StrapdownState, sample: Sample, values: Array) -> tuple[float, bool]:
+        """The stamp [s] of a row, on the even steps where it has none or is alone off them; and whether it is off.
+
+        Raises `RecordError` for a gap, and for what is no number: a solution is carried through every sample.
+        """
+        rows, count, t = state.rows, state.filled, sample.t
         if not np.isfinite(values).all():
             raise RecordError(self._where, f"row {count + 1} holds no number, expected one in every column")
-        if count < _HEAD:
-            return
-        step, usual = sample.t - rows[count - 1, 0], float(np.median(np.diff(rows[:_HEAD, 0])))
-        if not abs(step - usual) <= LIMITS.uneven * usual:
+        if count < _HEAD and not math.isnan(t):
+            return t, False
+        before, usual = float(rows[count - 1, 0]), float(np.median(np.diff(rows[: min(count, _HEAD), 0])))
+        if math.isnan(t):
+            return before + usual, state.off
+        if abs(t - before - usual) <= LIMITS.uneven * usual:
+            return t, False
+        if state.off:  # so it was the row before that did not go on
             raise RecordError(
                 self._where,
-                f"t: a step of {step:.4g} s after row {count} where {usual:.4g} s is usual, expected samples without "
-                "gaps",
+                f"t: a step of {t - before:.4g} s after row {count - 1} where {usual:.4g} s is usual, expected samples "
+                "without gaps",
             )
+        return before + usual, True
 
     def _ts(self, state: StrapdownState) -> float:
         """Interval [s] of the samples."""

@@ -86,7 +86,9 @@ def orientations(records: Sequence[Record], rates: Array) -> Orientations:
 
 
 def _steady(triad: Triad) -> tuple[Array, list[str]]:
-    """Mean outputs of the steady stretches of a recording, and their times."""
+    """Mean outputs of the steady stretches of a recording, and their times; rows without a time end none."""
+    stamped = np.isfinite(triad.t)
+    triad = replace(triad, t=triad.t[stamped], values=triad.values[stamped])
     window = window_samples(triad.rate)
     variance = windowed_variance(triad.values, window)
     calm = float(np.quantile(variance[np.isfinite(variance)], LIMITS.calm_quantile, method="lower")) if np.any(

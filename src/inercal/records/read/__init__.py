@@ -19,6 +19,7 @@ from inercal.records.read.join import FileTable, joined
 from inercal.records.read.limits import size_of
 from inercal.records.read.table import Format, Part, Reader
 from inercal.records.record import Record
+from inercal.records.stamps import with_sound_stamps
 from inercal.units import Unit
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def read(
     Returns
     -------
     Record
-        Every row of every file: what could not be read is NaN, and is in ``findings``.
+        Every row of every file: what could not be read, and time stamps that are wrong, are NaN, and in ``findings``.
 
     Raises
     ------
@@ -160,7 +161,7 @@ def _tables(
 
 def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: bool) -> Record:
     """The record of tables that belong together."""
-    columns = joined(tables, record_map, counted)
+    columns, of_time = with_sound_stamps(joined(tables, record_map, counted))
     sources = [
         *(file.source for file in tables),
         *([] if record_map is None else [source_of(record_map.path)]),
@@ -176,7 +177,7 @@ def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: 
     stamped = any("t" in file.table.values for file in tables)
     return Record(
         columns,
-        (*findings, *check(columns)),
+        (*findings, *of_time, *check(columns)),
         tuple(dict.fromkeys(sources)),
         next((file.table.labels for file in tables if file.table.labels), ()),
         rate_u=None if record_map is None or record_map.rate is None or stamped else record_map.rate_u,
