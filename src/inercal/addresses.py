@@ -17,61 +17,52 @@ HIDDEN = "***"
 """The text in the place of a secret."""
 
 PLAIN = frozenset(
-    [
-        "application_name",
-        "baud",
-        "ca",
-        "connect_timeout",
-        "dbname",
-        "host",
-        "login",
-        "passfile",
-        "port",
-        "region",
-        "schema",
-        "service",
-        "speed",
-        "sslcert",
-        "sslmode",
-        "sslrootcert",
-        "target_session_attrs",
-        "user",
-        "version",
-        "versionid",
-    ]
+    (
+        *("baud", "ca", "login", "speed", "version"),  # of wires
+        *(
+            "application_name",
+            "connect_timeout",
+            "dbname",
+            "host",
+            "passfile",
+            "port",
+            "schema",
+            "service",
+            "user",
+        ),
+        *("sslcert", "sslmode", "sslrootcert", "target_session_attrs"),
+        *("id", "lang", "no", "page", "region", "unit", "versionid"),
+    )
 )
 """Keys of queries whose values hold no secret: numbers, names, and files that hold one."""
 
-_NAMED = frozenset(
-    ["ftp", "mariadb", "mssql", "mysql", "oracle", "postgres", "postgresql", "sftp", "smb", "ssh"]
-)
+_DATABASES = frozenset(("mariadb", "mssql", "mysql", "oracle", "postgres", "postgresql"))
+_NAMED = _DATABASES | {"ftp", "sftp", "smb", "ssh"}
 """Schemes whose login is the name of a user, which may be shown."""
 
-_LOCAL = frozenset(("file", "local", "sqlite"))
-"""Schemes without host and login."""
+_LOCAL = frozenset(("file", "hdf5", "local", "parquet", "replay", "serial", "sqlite", "text"))
+"""Schemes of what is on this machine: without login, unless two slashes lead to one."""
 
-# one slash is enough: paths of the system make one of two
-_SCHEME = re.compile(r"(?<![A-Za-z0-9+.-])[A-Za-z][A-Za-z0-9+.-]+:/+(?=[^/\s])")
+# One slash is enough behind a longer word: paths of the system make one of two.
+_SCHEME = r"(?:[A-Za-z][A-Za-z0-9+.-]*:/{2,}|[A-Za-z][A-Za-z0-9+.-]+:/)"
+_IN_TEXT = re.compile(rf"(?:^|(?<=[\s\"'(\[{{<>`])|(?<=::)|(?<=[\w\]]=)){_SCHEME}")
+_WHOLE = re.compile(rf"(?:^(?:[\w.-]+=)?|(?<=::)){_SCHEME}")
 _WORD = re.compile(r"[^\s\"'<>]*")
 _PORT = re.compile(r"(?:\[[^\]]*\]|[^:]*)(?::(?:\d{0,5}|PORT|\*\*\*))?[.,:;)\]}]*")
 _ASSIGNED = re.compile(
-    r"(?i)(?<!\w)([\w-]*(?:password|passwd|passphrase|pwd|secret|token|access_?key|api_?key)\s*=\s*)"
-    r"(\"[^\"]*\"|'[^']*'|[^\s&;,=\"'][^\s&;,\"']*)"
+    r"(?i)(?<![\w-])([\w-]*(?:(pass(?:word|wd|phrase)|pwd)|secret|token|access_?key|api_?key|sessionid)\s*=\s*)"
+    r"(\"[^\"]*\"|'[^']*'|[^\s=\"'][^\s\"']*)"
 )
 
 
 def without_secrets(text: str) -> str:
     """The text with the secrets of all addresses in it hidden, and those of ``password=...``."""
-    if ":/" not in text and "=" not in text:
-        return text
-    return _ASSIGNED.sub(rf"\1{HIDDEN}", "".join(_pieces(text, whole=False)))
+    return _without(text, whole=False)
 
 
 def shown_address(text: str) -> str:
     """One address, or an option with one (``--store=...``), with its secrets hidden, spaces and quotes among them."""
-    if ":/" not in text and "=" not in text:
-        return text
-    return _ASSIGNED.sub(rf"\1{HIDDEN}", "".join(_pieces(text, whole=True)))
+    return _without(_without(text, whole=True), whole=False)
 
 
 def holds_secret(address: str) -> bool:
@@ -110,10 +101,23 @@ def without_login(address: str) -> str:
     return f"{scheme}{re.split('[?#]', tail, maxsplit=1)[0]}"
 
 
+def _without(text: str, whole: bool) -> str:
+    """The text with secrets hidden; ``whole``: it is one address, else each word may be one."""
+    if ":/" in text:
+        text = "".join(_pieces(text, whole))
+    return _ASSIGNED.sub(_unassigned, text) if "=" in text else text
+
+
+def _unassigned(match: re.Match[str]) -> str:
+    """``password=...`` without its value; a ``token=...`` that is a folder of a path stays."""
+    path = match[2] is None and "/" in match[3]
+    return match[0] if path else f"{match[1]}{HIDDEN}"
+
+
 def _pieces(text: str, whole: bool) -> Iterator[str]:
     """The text in pieces, those of addresses with their secrets hidden."""
     begin = 0
-    for match, end in _spans(text):
+    for match, end in _spans(text, whole):
         yield text[begin : match.end()]
         yield _hidden(match[0], text[match.end() : end], whole)
         begin = end
@@ -121,16 +125,26 @@ def _pieces(text: str, whole: bool) -> Iterator[str]:
 
 
 def _addresses(text: str) -> Iterator[tuple[str, str]]:
-    """Each scheme of a text, and what follows it up to the next."""
-    for match, end in _spans(text):
+    """The scheme of each address of a chain, and the rest of that address."""
+    for match, end in _spans(text, whole=True):
         yield match[0], text[match.end() : end]
 
 
-def _spans(text: str) -> Iterator[tuple[re.Match[str], int]]:
+def _spans(text: str, whole: bool) -> Iterator[tuple[re.Match[str], int]]:
     """Matches of the schemes in a text, and the end of each address."""
-    schemes = list(_SCHEME.finditer(text))
+    schemes = list((_WHOLE if whole else _IN_TEXT).finditer(text))
+    if not whole:  # behind = of a query the address goes on
+        schemes = [match for match in schemes if not _is_in_query(text, match.start())]
     for match, following in zip_longest(schemes, schemes[1:]):
         yield match, len(text) if following is None else following.start()
+
+
+def _is_in_query(text: str, start: int) -> bool:
+    """True for a place behind ``=`` within a word that is an address already."""
+    return (
+        text[start - 1 : start] == "="
+        and "://" in re.split(r"[\s\"']", text[max(start - 500, 0) : start])[-1]
+    )
 
 
 def _named(scheme: str) -> bool:
@@ -140,7 +154,7 @@ def _named(scheme: str) -> bool:
 
 def _kind(scheme: str) -> str:
     """The kind of a scheme: ``postgresql`` of ``postgresql+psycopg://``."""
-    return re.split(r"[+:]", scheme.lower())[0]
+    return re.split(r"[+:]", scheme.lower().rpartition("=")[2])[0]
 
 
 def _hidden(scheme: str, rest: str, whole: bool) -> str:
@@ -165,10 +179,10 @@ def _divided(scheme: str, rest: str, whole: bool) -> tuple[str, str, str]:
 
     A password may hold any character, typed as it is: where the port is no number, the login goes on to the last ``@``.
     """
-    if _kind(scheme) in _LOCAL:
-        return "", "", rest
     word = rest if whole else _word(rest)
     host = re.split(r"[/?#\\]", word, maxsplit=1)[0]
+    if _kind(scheme) in _LOCAL and (scheme.count("/") != 2 or "@" not in host):
+        return "", "", rest
     end = -1
     if "@" in host:
         end = (word if ":" in host else host).split("?")[0].rfind("@")
@@ -176,7 +190,7 @@ def _divided(scheme: str, rest: str, whole: bool) -> tuple[str, str, str]:
         end = rest.split("\n")[0].rfind("@")
         if end < 0:  # cut off, as a long word in a message is
             return word, "", rest[len(word) :]
-    elif host and _named(scheme) and ":" in host:  # as SQLAlchemy reads it
+    elif host and _kind(scheme) in _DATABASES and ":" in host:  # as SQLAlchemy reads it
         end = word.rfind("@")
     return ("", "", rest) if end < 0 else (rest[:end], "@", rest[end + 1 :])
 

@@ -2,7 +2,10 @@
 
 import base64
 import json
+import subprocess
+import sys
 from dataclasses import replace
+from hashlib import sha256
 
 import pytest
 from certified import DAY, LAB, lab_of
@@ -11,21 +14,24 @@ from sqlalchemy import select, text
 
 from inercal.cli import run
 from inercal.errors import InputError
+from inercal.estimate.files import save
+from inercal.inputs import Source
 from inercal.laboratory import keep as keeping
 from inercal.laboratory.carry import export_store, import_store
-from inercal.laboratory.catalog import results, show, values_of
+from inercal.laboratory.catalog import instruments, results, show, values_of
 from inercal.laboratory.certificate.reading import certificate_of
 from inercal.laboratory.certificate.written import certificate
 from inercal.laboratory.chain import digest_of, happened
 from inercal.laboratory.check import check
 from inercal.laboratory.database import writing
 from inercal.laboratory.issue import issuing
-from inercal.laboratory.keep import keep
+from inercal.laboratory.keep import Item, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.scrub import scrub
 from inercal.laboratory.store import make_store, open_store
 from inercal.laboratory.supersede import supersede
 from inercal.laboratory.tables import Base, Event
+from rows import for_each
 
 SECRET = "Hunter2SeCrEt"
 STORE = f"postgresql://lab:{SECRET}@host/db"
@@ -37,7 +43,7 @@ def secrets_of_old(monkeypatch):
         "estimate.files",
         "laboratory.keep",
         "laboratory.supersede",
-        "laboratory.certificate.elements",
+        "laboratory.certificate.written",
     ):
         monkeypatch.setattr(f"inercal.{module}.without_secrets", lambda given: given)
 
@@ -163,10 +169,6 @@ def test_nothing_is_left_in_the_files(tmp_path, monkeypatch):
 
 def test_a_file_with_a_secret_stays_and_is_named(store, tmp_path, capsys, place, monkeypatch):
     """Results rest on its SHA-256; a store without secrets is left as it is."""
-    from hashlib import sha256
-
-    from inercal.inputs import Source
-
     path = tmp_path / "study.toml"
     path.write_text(f'reference = "https://u:{SECRET}@host/x"')
     keep(store, result(1, inputs=[Source(str(path), sha256(path.read_bytes()).hexdigest())]), ITEM)
@@ -193,6 +195,94 @@ def test_objects_whose_address_holds_a_secret(tmp_path, monkeypatch):
     scrub(made)
     assert open_store(str(tmp_path / "store")).objects.where == "memory://lab/objects"
     assert not check(open_store(str(tmp_path / "store"))).faults
+
+
+def with_certificate_of_its_table(seed, address):
+    """A result whose study states a table with a certificate at an address."""
+    table = {"name": "T", "serial": "1", "certificate": address, "valid_until": "2027-01-01"}
+    given = result(seed)
+    return replace(given, provenance={**given.provenance, "settings": {"equipment": {"table": table}}})
+
+
+def test_rows_that_are_one_without_their_secrets_become_one(store, monkeypatch):
+    """Instruments and references of old results join those that were kept since."""
+    address = f"https://lab/c.pdf?token={SECRET}"
+    with monkeypatch.context() as old:
+        secrets_of_old(old)
+        keep(store, with_certificate_of_its_table(1, address), Item("M", "X", address))
+        keep(store, with_certificate_of_its_table(2, f"{address}2"), Item("M", "X", f"{address}2"))
+    keep(store, with_certificate_of_its_table(3, address), Item("M", "X", "https://lab/c.pdf?token=***"))
+    scrub(store)
+    assert SECRET.encode() not in everything(store)
+    assert check(store).faults == ()
+    (only,) = instruments(store)
+    assert (only["serial"], only["results"]) == ("https://lab/c.pdf?token=***", 3)
+
+
+def test_a_result_that_another_rests_on_stays_as_a_file(store, tmp_path, monkeypatch):
+    """A comparison was made of a result in a file, whose bytes are those of the kept one: its checksum must hold."""
+    with monkeypatch.context() as old:
+        secrets_of_old(old)
+        one = replace(result(1), provenance={"settings": {}, "arguments": ["selfcal", "--store", STORE]})
+        save(one, tmp_path / "cal.json")
+        keep(store, one, ITEM)
+        source = Source(str(tmp_path / "cal.json"), sha256((tmp_path / "cal.json").read_bytes()).hexdigest())
+        keep(store, result(2, inputs=[source]), ITEM)
+    done = scrub(store)
+    assert done.files == (source.sha256,)
+    assert check(store).faults == ()
+    assert scrub(store).objects == 0
+
+
+def test_a_certificate_whose_number_is_an_address_stays(store, tmp_path, monkeypatch):
+    """Its number is the key of its row, and the subject of its event."""
+    one = result(1)
+    identity = keep(store, one, ITEM).id
+    with monkeypatch.context() as old:
+        secrets_of_old(old)
+        made = certificate([one], lab_of(tmp_path, LAB), "https://lab/c?x=7", DAY)
+    with issuing(store, "https://lab/c?x=7", made, None, [identity]):
+        pass
+    scrub(store)
+    assert check(store).faults == ()
+    with pytest.raises(InputError, match=r"found a secret in the address 'https://lab/c\?x=\*\*\*'"):
+        certificate([one], lab_of(tmp_path, LAB), "https://lab/c?x=7", DAY)
+
+
+KILLED = """
+import os, sys
+import inercal.laboratory.scrub as scrubbing
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import open_store
+
+end = lambda *given: os._exit(9)
+where, place = sys.argv[1:]
+if where == "commit":
+    scrubbing._others = end
+elif where == "vacuum":
+    scrubbing.vacuum = end
+else:
+    Objects.remove = end
+scrubbing.scrub(open_store(place))
+"""
+
+
+@pytest.mark.slow
+@for_each("where", ["commit", "remove", "vacuum"])
+def test_killed_in_the_middle_it_goes_on(where, tmp_path, monkeypatch):
+    """The store is sound at each moment; the same command ends what the one before began."""
+    folder = tmp_path / where
+    folder.mkdir()
+    store, _ = spoil(make_store(str(folder / "store")), folder, monkeypatch)
+    store.engine.dispose()
+    ended = subprocess.run([sys.executable, "-c", KILLED, where, str(folder / "store")], check=False)
+    assert ended.returncode == 9
+    assert check(store).faults == ()
+    scrub(store)
+    store.engine.dispose()
+    files = [path for path in (folder / "store").rglob("*") if path.is_file()]
+    assert [path for path in files if SECRET.encode() in path.read_bytes()] == []
+    assert check(store).faults == ()
 
 
 def test_a_new_store_takes_no_secret(tmp_path, capsys):

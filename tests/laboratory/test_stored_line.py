@@ -1,9 +1,11 @@
 """A stored command line, which anybody may have written: only what reads kept files and computes is run again."""
 
+import hashlib
 import json
 import os
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
@@ -13,7 +15,9 @@ from inercal.cli.stored_line import COMMANDS_AGAIN, OPTIONS_AGAIN, Use, stored_l
 from inercal.cli.tree import COMMANDS, app
 from inercal.errors import InputError
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.laboratory.again import LaidOut
+from inercal.laboratory.again import LaidOut, laid_out
+from inercal.laboratory.objects import Objects
+from rows import for_each
 
 REFUSED = {
     "new imu", "new strapdown", "new turntable", "new selfcal", "new aoa", "new lab", "inspect", "apply", "convert",
@@ -332,12 +336,42 @@ def test_a_crafted_result_is_refused_in_one_sentence_and_nothing_is_touched(
 def test_a_kept_file_is_read_and_never_imported(lab, tmp_path, capsys, result):
     """A module of Python among the files of a result lies in the folder in which its command runs."""
     (lab / "json.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
-    import hashlib
-
     sha256 = hashlib.sha256((lab / "json.py").read_bytes()).hexdigest()
     identity = kept(lab, capsys, result, CALIBRATE, [{"path": "json.py", "sha256": sha256}])
     assert run(["rerun", identity[:10]]) == 0
     assert not (tmp_path / "ran").exists()
+
+
+def test_settings_of_other_programs_are_not_laid_out(lab, tmp_path, capsys, result):
+    """Libraries read files of hidden names from the folder they run in: numba's names a file that it writes."""
+    (tmp_path / "victim.txt").write_text("precious")
+    (lab / ".numba_config.yaml").write_text(f"chrome_trace: {tmp_path / 'victim.txt'}\n")
+    sha256 = hashlib.sha256((lab / ".numba_config.yaml").read_bytes()).hexdigest()
+    identity = kept(lab, capsys, result, CALIBRATE, [{"path": ".numba_config.yaml", "sha256": sha256}])
+    (lab / ".numba_config.yaml").unlink()
+    assert run(["rerun", identity[:10]]) == 2
+    assert "has a hidden name" in capsys.readouterr().err
+    assert (tmp_path / "victim.txt").read_text() == "precious"
+
+
+def test_two_files_of_one_name_are_not_laid_one_over_the_other(tmp_path):
+    """Names in which a secret was hidden may have become one."""
+    objects = Objects(str(tmp_path / "objects"))
+    one, other = objects.add(b"one"), objects.add(b"other")
+    store = SimpleNamespace(objects=objects)
+    same = SimpleNamespace(files=[("a=***", one, None), ("a=***", one, None)])
+    assert laid_out(store, same, tmp_path / "same").places == {"a=***": "a=***"}
+    two = SimpleNamespace(files=[("a=***", one, None), ("x/../a=***", other, None)])
+    with pytest.raises(InputError, match="stands for two files of this result"):
+        laid_out(store, two, tmp_path / "two")
+
+
+@for_each("path", ["/dev/zero", "pipe"])
+def test_a_result_that_names_a_device_or_a_pipe_is_not_waited_for(path, lab, capsys, result):
+    if path == "pipe":
+        os.mkfifo(lab / "pipe")
+    identity = kept(lab, capsys, result, CALIBRATE, [{"path": path, "sha256": "0" * 64}])
+    assert identity
 
 
 def test_files_that_a_study_and_a_map_name_by_absolute_paths_are_those_kept(lab, tmp_path, capsys):

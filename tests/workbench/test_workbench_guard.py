@@ -126,7 +126,9 @@ def test_the_password_gives_the_key_and_nothing_else_does():
 def test_a_long_body_ends_and_an_upload_does_not():
     pieces = (b"x" * (LARGEST_BODY // 2),) * 3
     assert asked(method="POST", pieces=pieces, **BEARER)[1]["body"] == b"-1"
-    assert asked(method="PUT", pieces=pieces, **BEARER)[1]["body"] == str(3 * (LARGEST_BODY // 2)).encode()
+    assert asked("/api/v1/lab", method="PUT", pieces=pieces, **BEARER)[1]["body"] == b"-1"
+    upload = asked("/api/v1/sessions/0001/files/x.csv", method="PUT", pieces=pieces, **BEARER)
+    assert upload[1]["body"] == str(3 * (LARGEST_BODY // 2)).encode()
 
 
 def test_answers_name_no_outside_source():

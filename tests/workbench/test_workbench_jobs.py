@@ -10,6 +10,7 @@ import time
 import pytest
 
 from inercal.errors import InputError
+from inercal.examples import FOLDER
 from inercal.workbench import jobs
 from inercal.workbench.jobs import Queue, State
 
@@ -239,6 +240,50 @@ def test_a_job_that_somebody_put_into_the_folder_is_refused(arguments, expected,
     finally:
         queue.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["work"]
+
+
+@pytest.mark.parametrize("way", ["study", "map", "settings of another program"])
+def test_a_stored_job_reads_only_files_of_its_work_folder(way, tmp_path):
+    """Neither what a map names elsewhere, nor settings that a library would read from the folder."""
+    where, folder = tmp_path / "work" / "sessions" / "0001", tmp_path / "work" / "jobs" / "00001"
+    where.mkdir(parents=True)
+    folder.mkdir(parents=True)
+    for name in ("ferraris.csv.gz", "ferraris-map.toml", "ferraris.toml"):
+        (where / name).write_bytes((FOLDER / name).read_bytes())
+        (tmp_path / name).write_bytes((FOLDER / name).read_bytes())
+    if way == "map":
+        column_map = (where / "ferraris-map.toml").read_text()
+        outside = tmp_path / "outside.csv.gz"
+        outside.write_bytes((FOLDER / "ferraris.csv.gz").read_bytes())
+        more = f'[file.a]\npath = "{outside}"\n{column_map.replace("[columns]", "[file.a.columns]")}'
+        (where / "ferraris-map.toml").write_text(f"{column_map}\n{more}")
+    elif way == "study":
+        (where / "ferraris.toml").unlink()
+        (where / "ferraris.toml").symlink_to(tmp_path / "ferraris.toml")
+    else:
+        (where / ".numba_config.yaml").write_text("chrome_trace: victim.txt\n")
+    words = ["calibrate", "imu", "ferraris.csv.gz", "--map", "ferraris-map.toml", "--study", "ferraris.toml"]
+    about = {**SOUND, "arguments": words, "where": str(where), "state": "waiting", "code": None}
+    (folder / "job.json").write_text(json.dumps(about))
+    queue = Queue(tmp_path / "work" / "jobs")
+    try:
+        job = queue.get("00001")
+        assert job.state is State.REFUSED, job.said
+        assert "expected" in job.said
+    finally:
+        queue.close()
+
+
+def test_a_pipe_in_the_folder_of_a_job_is_not_waited_for(tmp_path):
+    folder = tmp_path / "jobs" / "00001"
+    folder.mkdir(parents=True)
+    (folder / "job.json").write_text(json.dumps(SOUND))
+    os.mkfifo(folder / "said")
+    queue = Queue(tmp_path / "jobs")
+    try:
+        assert queue.get("00001").said == ""
+    finally:
+        queue.close()
 
 
 def test_a_job_of_a_work_folder_elsewhere_is_refused(tmp_path):

@@ -27,6 +27,21 @@ def sent(session, name, *pieces):
     return asyncio.run(receive(session, name, body()))
 
 
+def test_a_map_or_study_is_small(sessions):
+    """It is parsed: 10 MB of TOML would hold everybody up."""
+    session = sessions.begin("test")
+    with pytest.raises(InputError, match="found more than 1 MiB, expected a map or a study"):
+        sent(session, "x.toml", b"#" * 1024**2, b"#")
+    assert session.files == []
+
+
+def test_a_title_is_short_and_a_foreign_folder_no_session(sessions):
+    with pytest.raises(InputError, match="found 201 characters, expected 200 at most"):
+        sessions.begin("x" * 201)
+    (sessions.root / "²").mkdir(parents=True)
+    assert sessions.begin("x" * 200).id == "0001"
+
+
 HOSTILE = [
     "../../etc/passwd",
     "..\\..\\x.csv",

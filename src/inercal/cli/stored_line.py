@@ -50,10 +50,10 @@ OPTIONS_AGAIN: Mapping[str, Use] = {
     **dict.fromkeys(("--study", "--map", "--join", "--runs", "--tolerance"), "file"),
     **dict.fromkeys(("--set", "--begin", "--end", "--at", "--filter", "--compare", "--states"), "value"),
     **dict.fromkeys(("--static", "--centrifugal", "--tangential", "--smooth", "--points"), "value"),
-    **dict.fromkeys(("--seed", "--workers", "--coefficient", "--until", "simulate selfcal --runs"), "value"),
+    **dict.fromkeys(("--seed", "--coefficient", "--until", "simulate selfcal --runs"), "value"),
     **dict.fromkeys(("--out", "--report"), "below"),
     **dict.fromkeys(("--json", "--quiet", "--keep", "--store", "--instrument"), "dropped"),
-    **dict.fromkeys(("--cluster", "--checkpoint"), "dropped"),
+    **dict.fromkeys(("--cluster", "--checkpoint", "--workers"), "dropped"),
     **dict.fromkeys(("--stream", "--every", "--until-goals", "--checkpoint-every", "--after"), "refused"),
 }
 """The use of each option of these commands; one that means something else in a command stands there with it."""
@@ -86,12 +86,12 @@ class StoredLine:
                     options.append(name if value is True else f"{name}={word}")
                 else:
                     arguments.append(word)
-        self._check_named(laid)
+        self.check_named(laid)
         last = ["--", *arguments] if arguments else []
         return (*self.command.split(), *options, "--json", "--quiet", *last)
 
-    def _check_named(self, laid: LaidOut) -> None:
-        """Refuse a study, map or table that names a file elsewhere."""
+    def check_named(self, laid: LaidOut) -> None:
+        """Refuse a study, map or table that names a file elsewhere; raises `InputError`."""
         study, column_map, table = (
             self._file(laid, *names)
             for names in (_STUDIES, ("--map",), ("--runs",) if self.command == "aoa" else ())

@@ -72,8 +72,15 @@ def laid_out(store: Store, shown: Shown, root: Path) -> LaidOut:
         target = _below(root / "absolute", path) if absolute else Path(os.path.normpath(folder / path))
         if not target.is_relative_to(root):
             raise InputError(path, "leads elsewhere, expected the path of a file")
+        if target.name.startswith("."):
+            raise InputError(
+                path, "has a hidden name, as settings of other programs have, expected a recording or study"
+            )
+        content = _bytes(store, path, sha256, kept_at)
+        if target.exists() and target.read_bytes() != content:
+            raise InputError(path, "stands for two files of this result, expected a name for each")
         target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(_bytes(store, path, sha256, kept_at))
+        target.write_bytes(content)
         places[os.path.normpath(path)] = str(target) if absolute else os.path.normpath(path)
     return LaidOut(root, folder, places)
 

@@ -53,6 +53,12 @@ def _parsed(url: str, where: str) -> URL:
         raise InputError(
             where, "is not the URL of a database, expected postgresql://... or a folder"
         ) from error
+    if kind == "sqlite" and (
+        parsed.drivername != "sqlite" or parsed.username or parsed.password or parsed.host
+    ):
+        raise InputError(
+            where, "found a driver, login or host of SQLite, expected a folder or postgresql://..."
+        )
     if kind not in ("sqlite", "postgresql"):
         raise InputError(where, f"found a database {kind!r}, expected postgresql://... or a folder")
     return parsed.set(drivername="postgresql+psycopg") if kind == "postgresql" else parsed
@@ -61,7 +67,7 @@ def _parsed(url: str, where: str) -> URL:
 def _settle(connection: Any, _: object) -> None:
     """Readers beside a writer, foreign keys, and transactions begun by `_begin` alone."""
     connection.isolation_level = None
-    for pragma in ("foreign_keys=ON", "synchronous=FULL"):
+    for pragma in ("foreign_keys=ON", "synchronous=FULL", "secure_delete=ON"):
         connection.execute(f"PRAGMA {pragma}")
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from inercal._files import replacing
+from inercal._files import is_pipe, replacing
 from inercal.addresses import hidden_in
 from inercal.errors import InputError, MissingExtraError
 
@@ -42,6 +42,10 @@ class Objects:
             ) from error
         return system, path.rstrip("/")
 
+    def _said(self, error: OSError) -> str:
+        """The words of a file system, without the secrets of the address."""
+        return hidden_in(error.strerror or str(error), self.where)
+
     @property
     def local(self) -> bool:
         """True if the objects are files of this machine."""
@@ -63,6 +67,8 @@ class Objects:
 
         Raises `InputError` where it is another file, or cannot be read.
         """
+        if is_pipe(path):
+            raise InputError(path, "is a pipe or a device, expected a file")
         try:
             size = path.stat().st_size
             if not self.has(sha256, size):
@@ -85,7 +91,7 @@ class Objects:
                 system.makedirs(f"{path}/{sha256[:2]}", exist_ok=True)
                 system.pipe_file(f"{path}/{sha256[:2]}/{sha256}", b"".join(pieces))
             except OSError as error:
-                raise InputError(self.place(sha256), f"cannot be written ({error})") from error
+                raise InputError(self.place(sha256), f"cannot be written ({self._said(error)})") from error
             return
         target = Path(self.place(sha256))
         try:
@@ -108,7 +114,7 @@ class Objects:
         except FileNotFoundError:
             return
         except OSError as error:
-            raise InputError(self.place(sha256), f"cannot be deleted ({error.strerror or error})") from error
+            raise InputError(self.place(sha256), f"cannot be deleted ({self._said(error)})") from error
 
     def has(self, sha256: str, size: int) -> bool:
         """True if an object of that size is there."""
@@ -117,7 +123,7 @@ class Objects:
         except (FileNotFoundError, NotADirectoryError):
             return False
         except OSError as error:
-            raise InputError(self.place(sha256), f"cannot be read ({error.strerror or error})") from error
+            raise InputError(self.place(sha256), f"cannot be read ({self._said(error)})") from error
         return found == size
 
     def _size(self, sha256: str) -> int:
@@ -140,7 +146,7 @@ class Objects:
         except FileNotFoundError as error:
             raise InputError(self.place(sha256), "is missing, expected an object of the store") from error
         except OSError as error:
-            raise InputError(self.place(sha256), f"cannot be read ({error.strerror or error})") from error
+            raise InputError(self.place(sha256), f"cannot be read ({self._said(error)})") from error
         if digest.hexdigest() != sha256:
             raise InputError(
                 self.place(sha256), f"has the SHA-256 {digest.hexdigest()[:12]}..., expected that of its name"

@@ -11,8 +11,9 @@ import base64
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from sqlalchemy import Connection, Text, select, update
+from sqlalchemy import Connection, Table, Text, delete, select, update
 
 from inercal.addresses import holds_secret, without_login, without_secrets
 from inercal.errors import InputError
@@ -23,7 +24,7 @@ from inercal.laboratory.database import vacuum, writing
 from inercal.laboratory.migrations.append_only import suspended
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.store import Store
-from inercal.laboratory.tables import Base, Certificate, Event, Recording, Result, Setting
+from inercal.laboratory.tables import Base, Certificate, Event, Recording, Reference, Result, Setting, Used
 
 _APPEND_ONLY = (
     "recording",
@@ -88,10 +89,9 @@ def scrub(store: Store) -> Scrubbed:
         loose, files = _others(connection, store.objects)
         head = connection.execute(select(Event.hash).order_by(Event.number.desc())).scalars().first() or BEGIN
     objects = store.objects if place is None else Objects(place)
-    for sha256 in {*replaced, *loose} - set(replaced.values()):
+    for sha256 in {*replaced, *loose} - {*replaced.values(), *files}:
         objects.remove(sha256)
-    if replaced or texts:
-        vacuum(store.engine, store.where)
+    vacuum(store.engine, store.where)  # always: one before may have been cut short of it
     return Scrubbed(subjects, len(replaced), texts, tuple(files), before, head)
 
 
@@ -157,6 +157,8 @@ def _certificate(content: bytes) -> bytes:
     root, changed = tree_of(content, "certificate"), False
     for element in root.iter(f"{{{DCC}}}*"):
         old = element.text or ""
+        if element.tag == f"{{{DCC}}}uniqueIdentifier":
+            continue  # its number, the key of its row
         if element.tag == f"{{{DCC}}}dataBase64":
             inner = base64.b64decode(old)
             clean = _result(inner) if inner[:1] == b"{" else _page(inner)
@@ -190,10 +192,39 @@ def _clean_rows(connection: Connection) -> int:
                 if row[column.name] is not None and without_secrets(row[column.name]) != row[column.name]
             }
             if clean:
-                same = (column == row[column.name] for column in key)
-                connection.execute(update(table).where(*same).values(clean))
+                same = [column == row[column.name] for column in key]
+                if not _joined(connection, table, {**row, **clean}):
+                    connection.execute(update(table).where(*same).values(clean))
                 count += len(clean)
     return count
+
+
+def _joined(connection: Connection, table: Table, row: Mapping[str, Any]) -> bool:
+    """True for a row of instruments or references that is there already without secrets; results point to it then."""
+    if table.name not in _POINTERS:
+        return False
+    pointer, names = _POINTERS[table.name]
+    same = [table.c[name] == row[name] for name in names]
+    there = connection.execute(select(table.c.id).where(*same, table.c.id != row["id"])).scalar()
+    if there is None:
+        return False
+    if table.name == Reference.__tablename__:  # a result that used both has it once
+        twice = select(Used.result_id).where(Used.reference_id == there)
+        connection.execute(delete(Used).where(Used.reference_id == row["id"], Used.result_id.in_(twice)))
+    connection.execute(update(pointer.table).where(pointer == row["id"]).values({pointer.name: there}))
+    connection.execute(delete(table).where(table.c.id == row["id"]))
+    return True
+
+
+_POINTERS: Mapping[str, tuple[Any, tuple[str, ...]]] = {
+    "instrument": (Result.__table__.c.instrument_id, ("maker", "model", "serial")),
+    "reference": (Used.__table__.c.reference_id, ("name", "serial", "certificate", "valid_until")),
+}
+"""The column that points to rows of a table, and the columns by which these are told apart."""
+
+
+_KEYED = ("keep", "supersede", "certificate")
+"""Kinds of events whose subject is the key of a row."""
 
 
 def _clean_chain(connection: Connection) -> tuple[str, int]:
@@ -201,7 +232,8 @@ def _clean_chain(connection: Connection) -> tuple[str, int]:
     previous, old, count = BEGIN, BEGIN, 0
     for row in map(dict, connection.execute(select(Event).order_by(Event.number)).mappings().all()):
         old = row["hash"]
-        clean = {**row, "subject": without_secrets(row["subject"]), "previous": previous}
+        subject = row["subject"] if row["kind"].split()[-1] in _KEYED else without_secrets(row["subject"])
+        clean = {**row, "subject": subject, "previous": previous}
         clean["hash"] = previous = hash_of(clean)
         count += clean["subject"] != row["subject"]
         if clean != row:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal._files import read_bytes, write_text
+from inercal.addresses import without_secrets
 from inercal.errors import InercalError, InputError, plain, spelt
 from inercal.laboratory.place import VARIABLE
 from inercal.workbench.jobs import Job, Queue
@@ -168,7 +169,7 @@ class Bench:
                 session.title, f"found no study that plans a test, expected one of {', '.join(PLANNED)}"
             )
         kind = PLANNED[session.kind]
-        words = [*kind.command, STUDY, *(word for each in settings for word in ("--set", each))]
+        words = [*kind.command, STUDY, *(f"--set={setting}" for setting in settings)]
         out = ["--out", f"{{out}}/plan{kind.ending}"] if kind.ending else []
         return self.queue.add(session.id, session.folder, [*words, *out, "--report", "{out}/report.html"])
 
@@ -334,7 +335,7 @@ def open_bench(root: Path, store: str | None = None) -> Bench:
 
 def said_of(error: BaseException) -> str:
     """The words of an error for a page."""
-    words = " ".join(spelt(str(error)).split())
+    words = " ".join(spelt(without_secrets(str(error))).split())
     if len(words) > _LONGEST:  # the beginning says where, the end what was expected
         words = f"{words[: 2 * _LONGEST // 3]} ... {words[-_LONGEST // 3 :]}"
     if isinstance(error, InercalError):

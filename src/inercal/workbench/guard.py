@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import ipaddress
+import re
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
@@ -205,8 +206,9 @@ async def _refuse(scope: Scope, send: Send, status: int, words: str, form: str =
 
 
 def _limited(receive: Receive, scope: Scope) -> Receive:
-    """Receive a body no larger than `LARGEST_BODY`, but for uploads, which count themselves."""
-    if scope["type"] != "http" or scope["method"] == "PUT":
+    """Receive a body no larger than `LARGEST_BODY`, but for uploads to a session, which count themselves."""
+    upload = re.match(r"/api/v1/sessions/\d+/files/", scope.get("path", ""))
+    if scope["type"] != "http" or (scope["method"] == "PUT" and upload):
         return receive
     count = 0
 

@@ -21,7 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from inercal._files import read_bytes, write_text
+from inercal._files import is_pipe, read_bytes, write_text
 from inercal.addresses import shown_address
 from inercal.errors import InercalError, InputError, plain, spelt
 
@@ -99,8 +99,12 @@ class Job:
 
 def _text(path: Path) -> str:
     """The last part of a text that may not be there."""
+    if is_pipe(path):
+        return ""
     try:
-        return path.read_bytes()[-_LAST:].decode(errors="replace")
+        with open(path, "rb") as file:
+            file.seek(max(path.stat().st_size - _LAST, 0))
+            return file.read(_LAST).decode(errors="replace")
     except OSError:
         return ""
 

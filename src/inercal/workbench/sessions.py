@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import re
@@ -33,6 +34,8 @@ PART = ".part"
 
 _ABOUT = "session.json"
 _LONGEST = 120
+_LONGEST_TITLE = 200
+_LARGEST_TOML = 1024**2
 
 COMMANDS = {
     "imu": ("calibrate", "imu"),
@@ -117,9 +120,10 @@ class Sessions:
 
     def begin(self, title: str, kind: str = "imu") -> Session:
         """A new session without files; raises `InputError` for a title that is no plain text."""
-        plain("title", title)
+        if len(plain("title", title)) > _LONGEST_TITLE:
+            raise InputError("title", f"found {len(title)} characters, expected {_LONGEST_TITLE} at most")
         self.root.mkdir(parents=True, exist_ok=True)
-        numbers = [int(folder.name) for folder in self.root.iterdir() if folder.name.isdigit()]
+        numbers = [int(folder.name) for folder in self.root.iterdir() if _is_number(folder.name)]
         number = max(numbers, default=0)
         while True:  # another process may be taking the same number
             number += 1
@@ -164,6 +168,11 @@ class Sessions:
         write_text(session.folder / _ABOUT, json.dumps(about) + "\n")
 
 
+def _is_number(name: str) -> bool:
+    """True for the name of a session's folder."""
+    return name.isascii() and name.isdigit()
+
+
 def safe_name(given: str) -> str:
     """The name of an uploaded file in a session: its last part, without what a system may take for something else.
 
@@ -200,7 +209,9 @@ async def receive(session: Session, given: str, body: AsyncIterator[bytes]) -> P
                 if shutil.disk_usage(session.folder).free < SPARE + len(piece):
                     raise InputError(name, "found too little room on the disk, expected 512 MiB to spare")
                 file.write(piece)
-        target = session.folder / _place(part, name)
+        if Path(name).suffix.lower() == ".toml" and count > _LARGEST_TOML:
+            raise InputError(name, "found more than 1 MiB, expected a map or a study")
+        target = session.folder / await asyncio.to_thread(_place, part, name)
         os.replace(part, target)
         return target
     except ConnectionError:  # of the sender

@@ -6,10 +6,13 @@ lists of `inercal.cli.stored_line`, and against the work folder: files come from
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from inercal.cli.stored_line import stored_line
 from inercal.errors import InputError
+from inercal.laboratory.again import LaidOut
+from inercal.workbench.sessions import PART
 
 
 def check_stored(arguments: tuple[str, ...], where: Path, work: Path, own: Path) -> None:
@@ -18,7 +21,7 @@ def check_stored(arguments: tuple[str, ...], where: Path, work: Path, own: Path)
     ``where`` the command is run, ``work`` is the work folder, ``own`` that of the job.
     """
     line = stored_line(list(arguments))
-    inside = _is_inside(where, work)
+    inside, files = _is_inside(where, work), {}
     for name, values in line.given.items():
         use = line.use(name)
         if use == "dropped" and name not in ("--json", "--quiet"):
@@ -28,9 +31,14 @@ def check_stored(arguments: tuple[str, ...], where: Path, work: Path, own: Path)
         for value in values:
             if use == "below" and not _is_inside(where / value, own):
                 raise InputError(value, "lies outside the folder of the job, expected a file in it")
-            inside = inside and (use != "file" or _is_inside(where / str(value), work))
+            if use == "file":
+                inside = inside and _is_inside(where / str(value), work)
+                files[os.path.normpath(str(value))] = os.path.normpath(str(value))
             if not inside:
                 raise InputError(value, "lies outside the work folder, expected a file in it")
+    if any(path.suffix != PART for path in where.glob(".*")):
+        raise InputError(where, "holds a hidden file, as settings of other programs are, expected none")
+    line.check_named(LaidOut(work.resolve(), where, files))
 
 
 def _is_inside(path: Path, folder: Path) -> bool:

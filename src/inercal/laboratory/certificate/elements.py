@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from inercal.addresses import without_secrets
 from inercal.errors import InputError
 from inercal.instruments.dsi import as_written, dsi, is_coherent
 
@@ -47,8 +46,7 @@ def _element(tag: str, children: Sequence[_Element | str | None], ref_type: str 
 
 
 def plain(text: str) -> str:
-    """A text on one line, without secrets of addresses, with ? for what XML cannot hold."""
-    text = without_secrets(text)
+    """A text on one line, with ? for what XML cannot hold."""
     return " ".join(re.sub("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", text).split())
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from lxml import etree
 
+from inercal.addresses import without_secrets
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Status
@@ -17,6 +18,7 @@ from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
 from inercal.laboratory.certificate.results import measured
 from inercal.laboratory.certificate.schema import VERSION, fault
 from inercal.laboratory.specification import Conformity, Specification, judged, specification_of
+from inercal.units import shown
 
 
 def certificate(
@@ -83,6 +85,14 @@ def certificate(
     conform = statement(specification, found) if found else None
     root.append(administrative(stated, number, issued.isoformat(), supersedes, types, conform))
     root.append(results)
+    for element in root.iter():
+        text = element.text or ""
+        if element.tag != f"{{{DCC}}}dataBase64" and (clean := without_secrets(text)) != text:
+            raise InputError(
+                "certificate",
+                f"found a secret in the address {shown(clean)}, expected it without login and query, for a certificate "
+                "is handed out",
+            )
     etree.indent(root, " ")
     wrong = fault(root)
     if wrong is not None:
