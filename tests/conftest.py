@@ -5,6 +5,8 @@ import os
 import signal
 import sys
 import time
+from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -111,6 +113,47 @@ def pytest_collection_finish():
 
 def pytest_configure(config):
     config.began, config.asked = time.monotonic(), 0
+    config.pluginmanager.register(ProcessorTime(), "processor_time")
+
+
+class ProcessorTime:
+    """Processor time by room of the tests: a folder of `tests`, or a file that lies there [s].
+
+    Processes that a test starts count once it has waited for them; fixtures count where they are first asked for, and
+    collecting and importing apart.
+    """
+
+    def __init__(self):
+        self.own, self.of_rooms = Counter(), Counter()
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item):
+        began = processor()
+        done = yield
+        room, *_ = item.path.relative_to(Path(__file__).parent).parts
+        self.own[room] += processor() - began
+        return done
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session):
+        # where workers run the tests, their time is theirs to tell
+        self.own["collecting"] = processor() - self.own.total() if self.own else time.process_time()
+        self.of_rooms.update(self.own)
+        if hasattr(session.config, "workeroutput"):
+            session.config.workeroutput["processor_time"] = dict(self.own)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node):
+        self.of_rooms.update(getattr(node, "workeroutput", {}).get("processor_time", {}))
+
+    def pytest_terminal_summary(self, terminalreporter):
+        """The table, where tests of more than one room ran."""
+        if len(self.of_rooms) > 2:
+            terminalreporter.section("processor time by room [s]")
+            for room, taken in self.of_rooms.most_common():
+                terminalreporter.write_line(f"{room:<28}{taken:9.1f}")
+            minutes = self.of_rooms.total() / 60.0
+            terminalreporter.write_line(f"{'in all':<28}{60.0 * minutes:9.1f}, {minutes:.1f} core-minutes")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -61,7 +61,7 @@ Map, lower floors first; each imports only from those above its own line
                                kalman
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
-    designs                    candidates, criteria, exchange, comparison
+    designs                    candidates, criteria, exchange, search, comparison
     imu                        multiposition (poses, accelerometer, turns, gyro), means, known_rates, known_turns,
                                ferraris, aided, temperature, task
     strapdown                  coefficients, kernels, samples, rests, batch, error_state, restricted, averaged,

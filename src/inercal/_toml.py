@@ -92,7 +92,7 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: unknown key, {hint}"
         case "missing":
             return f"{key}: missing, expected a value"
-        case "literal_error" if gone := in_place_of(key, str(value)):
+        case "literal_error" if isinstance(value, str) and (gone := in_place_of(key, value)):
             return f"{key}: found {shown(value)}, {gone}"
         case "literal_error":
             return f"{key}: found {shown(value)}, expected {first['ctx']['expected']}"

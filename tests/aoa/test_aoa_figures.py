@@ -19,7 +19,7 @@ from inercal.aoa.figures.learned import consistency
 from inercal.aoa.settings import Attitude
 from inercal.aoa.simulate import simulate, to_record
 from inercal.aoa.task import measure
-from inercal.report.over_time import Marks, Panel, gaps, measured, over_time, stretches, thinned
+from inercal.report.over_time import Marks, Signals, gaps, measured, over_time, stretches, thinned
 from inercal.report.spectra import of_angle, peak, spectral_density
 from inercal.units import Quantity, parse_unit
 
@@ -314,9 +314,9 @@ def test_extreme_numbers_can_be_drawn():
     t = np.arange(50.0)
     wild = np.where(t > 40.0, np.inf, np.where(t > 30.0, 1e300, t))
     panels = [
-        Panel("nothing", {"x": np.full(50, np.nan)}, band=(np.full(50, np.nan), np.full(50, np.nan))),
-        Panel("wild", {"x": wild, "y": -wild}, zero=True),
-        Panel("flat", {"x": np.zeros(50)}, scale="log", levels={"one": 1.0}),
+        Signals("nothing", {"x": np.full(50, np.nan)}, band=(np.full(50, np.nan), np.full(50, np.nan))),
+        Signals("wild", {"x": wild, "y": -wild}, zero=True),
+        Signals("flat", {"x": np.zeros(50)}, scale="log", levels={"one": 1.0}),
     ]
     assert {"nothing", "wild", "one"} <= set(texts(over_time("", "", t, panels)))
     assert "nothing" in texts(over_time("", "", t[:1], [replace(panels[0], lines={"x": t[:1]})]))

@@ -56,7 +56,7 @@ def test_a_lever_does_what_its_key_in_the_study_does(studies, kind):
 def test_uncertainties_of_positions_are_those_of_their_design(studies):
     settings = studies("turntable").settings
     asked = replace(settings.design, candidates=named("24-position"), compare=("24-position",))
-    judged = design(replace(settings, plan=named("12-position"), design=asked)).judged
+    judged = design(replace(settings, plan=named("12-position"), design=asked)).compare
     expected = next(each for each in judged if each.plan.name == "24-position").figures
     found = foresight(studies("turntable"))
     u = found.u(np.ones(len(found.levers)))

@@ -367,7 +367,7 @@ def drift(chain, angles, known=(), weighted=True):
 def plans():
     """The paper's way with a limit that bites; the free design; D-optimal for noise alone."""
     limit = Constraint(INNER, ("ax", "ay"), 0.05)
-    return planning.design(study(criterion="I", constraint=limit)).judged[:3]
+    return planning.design(study(criterion="I", constraint=limit)).compare[:3]
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from inercal.report.cells import small
 from inercal.report.coefficients import limits
 from inercal.report.marks import Axis, Band, Bars, Cells, Colours, Dots, Level, Line, Note, Panel, Strips
 from inercal.report.panels import draw, symlog_ticks
@@ -31,6 +32,31 @@ def test_every_mark_is_drawn():
     assert (drawn.title, drawn.caption) == ("A title", "What it is.")
     assert {"line", "dots", "band", "level", "bars", "here", "across", "up", "head"} <= set(words(drawn))
     assert drawn.figure.axes[0].get_title() == "head"
+
+
+def test_small_panels_are_of_the_same_marks():
+    """Names above in their colours, numbers below the last row; a mark that they do not have is no silent gap."""
+    x, along = np.arange(3.0), Axis("across", limits=(0.0, 2.0))
+    marks = [
+        Line(x, x, "line"),
+        Dots(x, x, "dots"),
+        Band(x, x, x + 1.0, "band"),
+        Strips((0.0, 1.0)),
+        Level(1.0, "level"),
+        Level(1.0, upright=True),
+        Bars(x, 0.0 * x, x, "bars", upright=True),
+    ]
+    rows = Panel([Bars([0, 1, 1], [0.0, 0.0, 1.5], [2.0, 1.0, 2.0])], along, Axis(names=["first", "second"]))
+    panels = [Panel(marks, along, Axis("up", limits=(0.0, 3.0)), "head"), rows]
+    drawn = small("A title", "What it is.", panels, 1.0)
+    assert (drawn.title, drawn.caption) == ("A title", "What it is.")
+    found = words(drawn)
+    assert {"line", "dots", "band", "level", "bars", "up", "head", "first", "second"} <= set(found)
+    assert found.count("across") == 1
+    heights = {text.get_text(): text.get_position()[1] for text in drawn.figure.axes[0].texts}
+    assert heights["up"] > heights["first"] > heights["second"]
+    with pytest.raises(TypeError, match="found a Cells"):
+        small("", "", [Panel([Cells(np.eye(2), (0.0, 1.0, 0.0, 1.0))], along, along)], 1.0)
 
 
 def test_rows_are_counted_from_the_top():

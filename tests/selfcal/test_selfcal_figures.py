@@ -23,7 +23,7 @@ from inercal.report.coefficients import dots
 from inercal.report.courses import turning
 from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.before.observability import observability
-from inercal.selfcal.before.path_design import ComparedPath, Designed
+from inercal.selfcal.before.path_design import ComparedPath, DesignedPath
 from inercal.selfcal.figures.design import page as design_page
 from inercal.selfcal.figures.filters import attitude_errors
 from inercal.selfcal.figures.monte_carlo import page as campaign_page
@@ -421,7 +421,7 @@ def test_the_page_of_a_design():
     settings = study(goal={"kg0_x": 0.01 * PER_HOUR})
     sight = np.full(18, 0.01)
     sight[8] = 0.95
-    found = Designed(
+    found = DesignedPath(
         (
             judged("found", path("plain"), np.full(18, 0.002), settings),
             judged("study", SHORT, sight, settings),
@@ -438,13 +438,13 @@ def test_the_page_of_a_design():
 def test_a_design_is_set_against_its_goals():
     """The last column is the bound of the path found over the goal, and the picture has a bar at each goal."""
     settings = study(goal={"kg0_x": 0.01 * PER_HOUR})
-    found = Designed((judged("found", SHORT, np.full(18, 0.002), settings),), "", ())
+    found = DesignedPath((judged("found", SHORT, np.full(18, 0.002), settings),), "", ())
     table = bounds_by_path(found)
     ratio = 0.002 * PRIOR[0] / (0.01 * PER_HOUR)
     assert table.columns[-1] == ("of goal", "")
     assert [row[-1] for row in table.rows] == [f"{ratio:.3g}", *["–"] * 17]
     assert "Bar: the goal." in design_page(found, settings, told(found))
-    without = Designed((judged("found", SHORT, np.full(18, 0.002), study()),), "", ())
+    without = DesignedPath((judged("found", SHORT, np.full(18, 0.002), study()),), "", ())
     assert bounds_by_path(without).columns[-1] == ("prior", "")
     assert "Bar: the goal." not in design_page(without, study(), told(without))
     with_goal, plain = (

@@ -10,11 +10,12 @@ from grades import GRADES, NAV, fitted, plan, u_by_kind
 
 import inercal as ic
 from inercal.cli import run
+from inercal.designs.search import improved
 from inercal.errors import InputError, StudyError
 from inercal.strapdown.bounds import Pieces, bounds
 from inercal.strapdown.coefficients import SIZE
 from inercal.strapdown.design import NINETEEN, angles_of, by_kind, design
-from inercal.strapdown.path_search import Ground, Judge, attitudes, improve, random_path
+from inercal.strapdown.path_search import TurnGround, attitudes
 from inercal.strapdown.settings import Design, Goal, Plan
 from inercal.strapdown.simulate import start_attitude
 
@@ -96,16 +97,15 @@ def test_attitudes_are_stated_as_they_are_read():
 
 
 def test_a_changed_path_is_judged_as_if_it_were_new():
-    """The judge goes on from where a path differs from the last."""
+    """Of paths that begin alike the common part is computed once."""
     pieces = Pieces(NAV)
     moves = tuple((axis, sign * np.pi / 2) for axis in range(3) for sign in (1.0, -1.0))
-    ground = Ground(pieces, attitudes(NAV.plan), moves, 6, bounds(pieces, NAV.plan).u, 244.0, 9.0, 70.0)
-    judge, rng = Judge(ground), np.random.default_rng(2)
-    first = random_path(ground, rng)
-    improve(judge, first, rng)
-    for path in (first, *list(judge.values)[::97]):
-        assert Judge(ground)(path) == pytest.approx(judge.values[path], rel=1e-9)
-    assert min(judge.values.values()) < judge.values[first]
+    ground = TurnGround(pieces, attitudes(NAV.plan), moves, 6, bounds(pieces, NAV.plan).u, 244.0, 9.0, 70.0)
+    values = {}
+    least, best = improved(ground, np.random.default_rng(2), values)
+    assert least == min(values.values()) == values[best]
+    for path in (best, *list(values)[::97]):
+        assert replace(ground).value(path) == pytest.approx(values[path], rel=1e-9)
 
 
 @pytest.mark.campaign

@@ -73,5 +73,5 @@ def test_noise_that_drowns_in_one_error_of_the_table_stops_no_design():
     wobbling = turntable("two_axis_turntable", None, {"dphi_y1": uniform(2.0 * ARCMIN)})
     posed = study(chain=wobbling, noise=1e-13 * DEG_H, terms=("DX_F", "DY_F"))
     made = design(replace(posed, design=Design(grid((6, 6)), positions=4)))
-    assert made.judged[0].figures.rank == made.judged[0].terms == 1
-    assert np.all(made.judged[0].figures.u < 1e-6 * DEG_H)
+    assert made.compare[0].figures.rank == made.compare[0].terms == 1
+    assert np.all(made.compare[0].figures.u < 1e-6 * DEG_H)

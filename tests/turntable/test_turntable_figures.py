@@ -192,7 +192,7 @@ def test_a_design_on_a_page():
         for row in re.findall("<tr>(.*?)</tr>", page, re.DOTALL)
     ]
     cells = next(row for row in rows if row and row[0] == "DX_F")
-    u = [each.figures.u[each.names.index("DX_F")] / DEG_H.factor for each in designed.judged]
+    u = [each.figures.u[each.names.index("DX_F")] / DEG_H.factor for each in designed.compare]
     assert cells[1:-1] == [rounded(x, x)[1] if np.isfinite(x) else "free" for x in u]
     assert cells[-1] == "deg/h"
     k_x = next(row for row in rows if row and row[0] == "k_x")

@@ -112,8 +112,8 @@ def test_a_design_says_what_a_better_latitude_would_be_worth():
     assert not remarks(made[0.0].findings)
     (said,) = remarks(made[0.3].findings)
     same = replace(few, candidates=made[0.3].plan, positions=24)
-    (best, *_) = design(replace(at(0.0, chain=table()), design=same)).judged
-    rms = [each.figures.rms_prediction / DEG_H for each in (made[0.3].judged[0], best)]
+    (best, *_) = design(replace(at(0.0, chain=table()), design=same)).compare
+    rms = [each.figures.rms_prediction / DEG_H for each in (made[0.3].compare[0], best)]
     assert rms[0] > 2.0 * rms[1]
     assert f"(latitude) that the rms u of the output is {rms[0]:.3g} deg/h" in said
     assert f"with an exact site it would be {rms[1]:.3g} deg/h" in said

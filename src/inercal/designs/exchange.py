@@ -14,6 +14,7 @@ positions as coefficients is no special case.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,8 +24,9 @@ from inercal.arrays import Array
 from inercal.designs.allowed import Mask, require
 from inercal.designs.candidates import Candidates
 from inercal.designs.criteria import Criterion, covariance
+from inercal.designs.search import from_starts
 from inercal.errors import InputError
-from inercal.estimate.executors import Executor, numbered
+from inercal.estimate.executors import Executor
 
 if TYPE_CHECKING:
     from inercal.designs.exchange_kernel import State
@@ -89,9 +91,8 @@ def exchange(
     indices = np.flatnonzero(open_)
     W, weights = _scaled(candidates.take(indices), criterion)
     p = len(candidates.names)
-    streams = tuple(rng.spawn(starts))
     designs = []
-    for best in numbered(_Starts(W, p, weights, n, repeats, streams), starts, executor):
+    for best in from_starts(partial(_from_start, W, p, weights, n, repeats), rng.spawn(starts), executor):
         if best is None:
             raise InputError(
                 where, f"found none that identifies all of {p} coefficients, expected more positions"
@@ -108,21 +109,12 @@ def exchange(
     return Design(designs[least], float(values[least]), values)
 
 
-@dataclass(frozen=True, eq=False)
-class _Starts:
-    """Random designs of ``n`` rows of W (m, c, d) after all exchanges, each start from its own stream."""
-
-    W: Array
-    p: int
-    weights: Array | None
-    n: int
-    repeats: bool
-    streams: tuple[np.random.Generator, ...]
-
-    def __call__(self, number: int) -> Indices | None:
-        """The design (n,) of a start; None where none identifies the coefficients."""
-        first = _start(self.W[..., : self.p], self.n, self.repeats, self.streams[number])
-        return None if first is None else _improved(self.W, self.p, self.weights, first, self.repeats)
+def _from_start(
+    W: Array, p: int, weights: Array | None, n: int, repeats: bool, rng: np.random.Generator
+) -> Indices | None:
+    """A random design of ``n`` rows of W (m, c, d) after all exchanges; None where none identifies the coefficients."""
+    first = _start(W[..., :p], n, repeats, rng)
+    return None if first is None else _improved(W, p, weights, first, repeats)
 
 
 def _value(plan: Candidates, criterion: Criterion) -> float:

@@ -134,7 +134,7 @@ def prepare_design(study: Study) -> None:
 def design(
     study: Study, progress: Callable[[int, int], None] | None = None, executor: Executor | None = None
 ) -> Result:
-    """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.Designed`."""
+    """Find the path that calibrates best; ``evidence`` is the `inercal.selfcal.before.path_design.DesignedPath`."""
     from inercal.selfcal.before.path_design import REFERENCES
     from inercal.selfcal.before.path_design import design as search
 

@@ -63,7 +63,7 @@ def prepare_design(study: Study) -> None:
 
 
 def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
-    """Judge a plan, and search for a better one; ``evidence`` is the `inercal.strapdown.design.Designed`."""
+    """Judge a plan, and search for a better one; ``evidence`` is the `inercal.strapdown.design.DesignedTurns`."""
     from inercal.strapdown.design import REFERENCES
     from inercal.strapdown.design import design as search
 

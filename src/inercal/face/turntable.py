@@ -70,7 +70,10 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
 
 def design(study: Study, progress: Progress = lambda _: None, executor: Executor | None = None) -> Result:
-    """Find the positions that calibrate best; ``evidence`` is the `inercal.turntable.positions.planning.Designed`."""
+    """Find the positions that calibrate best.
+
+    ``evidence`` is the `inercal.turntable.positions.planning.DesignedPositions`.
+    """
     from inercal.turntable.positions.planning import REFERENCES
     from inercal.turntable.positions.planning import design as planned
 

@@ -1,6 +1,7 @@
 """Many small panels on one page, drawn on a single pair of axes: a tenth of the time that axes of their own take.
 
-Coordinates of the drawing are inches; a `Cell` says where a panel lies and what it spans.
+The panels are those of `inercal.report.marks`. Coordinates of the drawing are inches; a `Cell` says where a panel lies
+and what it spans.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.report.style import INK, QUIET, figure, power_of_ten
+from inercal.report.html import Picture
+from inercal.report.marks import Axis, Band, Bars, Dots, Level, Line, Mark, Panel, Strips
+from inercal.report.style import INK, QUIET, WIDTH, figure, power_of_ten, svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +25,9 @@ if TYPE_CHECKING:
 
 _GRID = "#E3E7EB"
 _TICK = 0.03
+
+_TEXT = 0.066
+"""Width of a letter above a panel [inch], about."""
 
 
 @contextmanager
@@ -85,17 +91,59 @@ def _round_numbers(low: float, high: float, fewest: int) -> list[float]:
     return [float(k * step) + 0.0 for k in np.arange(np.ceil(low / step), np.floor(high / step) + 1.0)]
 
 
-def frame(
-    axes: Axes,
-    cell: Cell,
-    title: str = "",
-    times: bool = False,
-    label: str = "",
-    ticks: Sequence[float] | None = None,
-) -> None:
-    """Axes of a panel with numbers on its left, and below it too where ``times``; ``label`` stands at the left."""
+def small(
+    title: str,
+    caption: str,
+    panels: Sequence[Panel],
+    height: float,
+    widths: Sequence[float] = (1.0,),
+    head: float = 0.28,
+) -> Picture:
+    """A picture of ``panels`` of that ``height`` [inch], row by row, with ``head`` [inch] above each; ``widths`` of the
+    columns are in proportion.
+
+    Axes have limits, or names. What is labelled has its name above the panel, in its colour. The x axis has its numbers
+    and label below the last panel of a column.
+    """
+    gap, margin, foot, columns = 0.62, 0.62, 0.42, len(widths)
+    inches = (WIDTH - 0.12 - margin * columns) * np.asarray(widths) / sum(widths)
+    left = gap + np.cumsum([0.0, *(inches[:-1] + margin)])
+    total = foot + -(-len(panels) // columns) * (height + head)
+    with canvas(WIDTH, total) as (page, axes):
+        for k, panel in enumerate(panels):
+            row, column = divmod(k, columns)
+            bottom = total - (row + 1) * (height + head)
+            place = float(left[column]), bottom, float(inches[column]), height
+            count = len(panel.y.names)
+            cell = Cell(
+                *place,
+                _ends(panel.x),
+                (count - 0.5, -0.5) if count else _ends(panel.y),
+                "log" if panel.y.scale == "log" else "linear",
+            )
+            last = k >= len(panels) - columns
+            _frame(axes, cell, panel, last, "left" if columns == 1 else "center")
+            for mark in panel.marks:
+                _mark(axes, cell, mark)
+            if last:
+                middle = cell.left + 0.5 * cell.width
+                axes.text(middle, bottom - foot + 0.06, panel.x.label, fontsize=7.5, ha="center", va="bottom")
+        return Picture(title, caption, svg(page), page)
+
+
+def _ends(axis: Axis) -> tuple[float, float]:
+    """The limits of an axis, which are stated."""
+    assert axis.limits is not None
+    low, high = axis.limits
+    assert low is not None
+    assert high is not None
+    return low, high
+
+
+def _frame(axes: Axes, cell: Cell, panel: Panel, numbered: bool, ha: Literal["left", "center"]) -> None:
+    """Edges, numbers and words of a panel, with numbers on its left, and below it too where it is ``numbered``."""
     right, top = cell.left + cell.width, cell.bottom + cell.height
-    heights = list(cell.ticks() if ticks is None else ticks)
+    heights = [] if panel.y.names else cell.ticks()
     places = cell.up(np.array(heights))
     along = _round_numbers(*cell.x, 4 if cell.width > 3.0 else 2)
     feet = cell.across(np.array(along))
@@ -106,31 +154,84 @@ def frame(
         *([(x, cell.bottom - _TICK), (x, cell.bottom)] for x in feet),
     ]
     _strokes(axes, edges, QUIET, 0.6)
-    for height, place in zip(heights, places, strict=True):
-        axes.text(
-            cell.left - 2.0 * _TICK,
-            place,
-            number(height, cell.scale),
-            fontsize=6.5,
-            ha="right",
-            va="center_baseline",
-        )
-    if times:
+    texts = [(place, number(height, cell.scale), 6.5) for height, place in zip(heights, places, strict=True)]
+    texts += [(float(cell.up(np.array(k))), name, 7.0) for k, name in enumerate(panel.y.names)]
+    for place, text, size in texts:
+        axes.text(cell.left - 2.0 * _TICK, place, text, fontsize=size, ha="right", va="center_baseline")
+    if numbered:
         for value, foot in zip(along, feet, strict=True):
             axes.text(foot, cell.bottom - 2.0 * _TICK, f"{value:g}", fontsize=6.5, ha="center", va="top")
-    axes.text(
-        cell.left + 0.5 * cell.width, top + 0.04, title, fontsize=7.0, ha="center", va="bottom", color=INK
-    )
-    if label:
+    if panel.y.label:
+        x, y = cell.left - 0.5, cell.bottom + 0.5 * cell.height
+        axes.text(x, y, panel.y.label, fontsize=7.0, rotation=90, ha="center", va="center")
+    above = top + 0.045
+    at = cell.left if ha == "left" else cell.left + 0.5 * cell.width
+    if panel.title:
+        axes.text(at, above, panel.title, fontsize=7.0, ha=ha, va="bottom", color=INK)
+    named = [mark for mark in panel.marks if isinstance(mark, Line | Dots | Band | Bars) and mark.label]
+    for mark in reversed(named):
         axes.text(
-            cell.left - 0.5,
-            cell.bottom + 0.5 * cell.height,
-            label,
+            right,
+            above,
+            mark.label,
             fontsize=7.0,
-            rotation=90,
-            ha="center",
-            va="center",
+            fontweight="bold",
+            ha="right",
+            va="bottom",
+            color=mark.colour,
         )
+        right -= _TEXT * (len(mark.label) + 2)
+
+
+def _mark(axes: Axes, cell: Cell, mark: Mark) -> None:
+    """One mark of a panel."""
+    right, top = cell.left + cell.width, cell.bottom + cell.height
+    match mark:
+        case Line():
+            x, y = np.asarray(mark.x, dtype=float), np.asarray(mark.y, dtype=float)
+            _line(axes, cell, x, y, color=mark.colour, lw=mark.width, ls=mark.style)
+        case Level():
+            ends = (
+                (np.full(2, mark.at), np.array(cell.y))
+                if mark.upright
+                else (np.array(cell.x), np.full(2, mark.at))
+            )
+            _line(axes, cell, *ends, color=mark.colour, lw=mark.width, ls=mark.style)
+            place = float(cell.up(np.array(mark.at)))
+            if mark.label and cell.bottom <= place <= top:
+                axes.text(right, place + 0.02, mark.label, fontsize=6.5, ha="right", va="bottom", color=INK)
+        case Band():
+            x, low, high = (np.asarray(each, dtype=float) for each in (mark.x, mark.low, mark.high))
+            area = axes.fill_between(
+                cell.across(x), cell.up(low), cell.up(high), lw=0, color=mark.colour, alpha=mark.alpha
+            )
+            area.set_clip_path(_inside(axes, cell))
+        case Strips():
+            _strips(
+                axes, cell, np.reshape(mark.spans, (-1, 2)), cell.bottom, cell.height, mark.colour, mark.alpha
+            )
+        case Bars(upright=True):
+            x, low, high = (np.asarray(each, dtype=float) for each in (mark.at, mark.start, mark.end))
+            axes.vlines(cell.across(x), cell.up(low), cell.up(high), color=mark.colour, lw=1.4)
+        case Bars():
+            thick = mark.thickness * cell.height / abs(cell.y[1] - cell.y[0])
+            rows, spans = np.asarray(mark.at), np.column_stack([mark.start, mark.end])
+            for row in np.unique(rows):
+                bottom = float(cell.up(row)) - 0.5 * thick
+                _strips(axes, cell, spans[rows == row], bottom, thick, mark.colour, mark.alpha)
+        case Dots():
+            x, y = np.asarray(mark.x, dtype=float), np.asarray(mark.y, dtype=float)
+            axes.plot(
+                cell.across(x),
+                cell.up(y),
+                ls="none",
+                marker=mark.shape,
+                color=mark.colour,
+                ms=mark.size,
+                mew=1.6,
+            )
+        case _:
+            raise TypeError(f"found a {type(mark).__name__}, expected marks that small panels have")
 
 
 def _strokes(
@@ -152,16 +253,20 @@ def number(value: float, scale: str) -> str:
     return power_of_ten(value) if scale == "log" else f"{value:g}".replace("-", "−")
 
 
-def line(axes: Axes, cell: Cell, x: Array, y: Array, **look: Any) -> None:
+def _line(axes: Axes, cell: Cell, x: Array, y: Array, **look: Any) -> None:
     """A line in a panel, cut off at its edges."""
     (curve,) = axes.plot(cell.across(x), cell.up(y), **look)
     curve.set_clip_path(_inside(axes, cell))
 
 
-def band(axes: Axes, cell: Cell, x: Array, low: Array, high: Array, **look: Any) -> None:
-    """A band between two lines, cut off at the edges of the panel."""
-    area = axes.fill_between(cell.across(x), cell.up(low), cell.up(high), lw=0, **look)
-    area.set_clip_path(_inside(axes, cell))
+def _strips(
+    axes: Axes, cell: Cell, spans: Array, bottom: float, height: float, colour: str, alpha: float
+) -> None:
+    """Strips (k, 2) of the x axis of that ``height`` [inch], cut off at the ends of the panel."""
+    if len(spans):
+        places = np.clip(cell.across(spans), cell.left, cell.left + cell.width)
+        lengths = [(float(a), float(b - a)) for a, b in places]
+        axes.broken_barh(lengths, (bottom, height), color=colour, alpha=alpha, lw=0, zorder=0.5)
 
 
 def _inside(axes: Axes, cell: Cell) -> Any:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.report.cells import Cell, band, canvas, frame, line
+from inercal.report.cells import small
+from inercal.report.courses import times
 from inercal.report.html import Picture
-from inercal.report.marks import Axis, Band, Line, Mark, Panel
+from inercal.report.marks import Axis, Band, Bars, Line, Mark, Panel
 from inercal.report.panels import draw
-from inercal.report.style import ALARM, COLOURS, QUIET, WIDTH, envelope, svg
+from inercal.report.style import ALARM, COLOURS, QUIET, envelope
 
 _WINDOW = 50
 """Rows of a running mean."""
@@ -74,42 +75,36 @@ def _running(x: Array, window: int) -> Array:
 
 def innovations(t: Array, values: Array, channels: Sequence[str]) -> Picture:
     """Normalised innovations (m, c) over ``t`` (m,) [s], and beside each channel its autocorrelation."""
-    height, gap, beyond = 0.72, 0.14, []
-    total = 0.52 + len(channels) * (height + gap)
-    times, rows = (float(t[0]), float(t[-1])), (0.0, _LAGS + 1.0)
-    with canvas(WIDTH, total) as (page, axes):
-        for k, (channel, own) in enumerate(zip(channels, values.T, strict=True)):
-            bottom, last = total - 0.22 - (k + 1) * (height + gap) + gap, k == len(channels) - 1
-            largest = float(np.max(np.abs(own), initial=0.0, where=np.isfinite(own)))
-            top = max(4.0, 1.1 * min(largest, 1e6))
-            left = Cell(0.65, bottom, 4.05, height, times, (-top, top))
-            head = ("innovation / its standard deviation", "autocorrelation") if k == 0 else ("", "")
-            frame(axes, left, head[0], last, channel)
-            band(axes, left, t[[0, -1]], np.full(2, -2.0), np.full(2, 2.0), color=COLOURS[0], alpha=0.15)
-            line(axes, left, *envelope(t, own, 250), color=COLOURS[0], lw=0.5)
-            r, pairs = autocorrelation(own, _LAGS)
-            limit = 2.0 / np.sqrt(np.maximum(pairs, 1))  # twice the standard deviation of white noise
-            most = max(0.1, 1.1 * float(np.max(np.abs(r), initial=0.0)))
-            right = Cell(5.3, bottom, 1.7, height, rows, (-most, most))
-            frame(axes, right, head[1], last)
-            lags = np.arange(1.0, len(r) + 1.0)
-            band(axes, right, lags, -limit, limit, color=COLOURS[0], alpha=0.15)
-            far = np.abs(r) > limit
-            beyond.append(f"{channel} {int(far.sum())}")
-            for chosen, colour in ((~far, COLOURS[0]), (far, ALARM)):
-                feet = right.up(np.zeros(int(chosen.sum())))
-                axes.vlines(right.across(lags[chosen]), feet, right.up(r[chosen]), color=colour, lw=1.4)
-        for cell, label in ((left, "time [s]"), (right, "lag [rows]")):
-            axes.text(cell.left + 0.5 * cell.width, 0.06, label, fontsize=7.5, ha="center", va="bottom")
-        image = svg(page)
-    return Picture(
+    panels, beyond = list[Panel](), []
+    for channel, own in zip(channels, values.T, strict=True):
+        largest = float(np.max(np.abs(own), initial=0.0, where=np.isfinite(own)))
+        top = max(4.0, 1.1 * min(largest, 1e6))
+        over: list[Mark] = [
+            Band(t[[0, -1]], [-2.0, -2.0], [2.0, 2.0]),
+            Line(*envelope(t, own, 250), width=0.5),
+        ]
+        r, pairs = autocorrelation(own, _LAGS)
+        limit = 2.0 / np.sqrt(np.maximum(pairs, 1))  # twice the standard deviation of white noise
+        most = max(0.1, 1.1 * float(np.max(np.abs(r), initial=0.0)))
+        lags, far = np.arange(1.0, len(r) + 1.0), np.abs(r) > limit
+        beyond.append(f"{channel} {int(far.sum())}")
+        shifted: list[Mark] = [Band(lags, -limit, limit)]
+        for chosen, colour in ((~far, COLOURS[0]), (far, ALARM)):
+            shifted.append(Bars(lags[chosen], 0.0 * r[chosen], r[chosen], "", colour, upright=True))
+        heads = ("", "") if panels else ("innovation / its standard deviation", "autocorrelation")
+        panels.append(Panel(over, times(t), Axis(channel, limits=(-top, top)), heads[0]))
+        along = Axis("lag [rows]", limits=(0.0, _LAGS + 1.0))
+        panels.append(Panel(shifted, along, Axis(limits=(-most, most)), heads[1]))
+    return small(
         "Innovations and whether they are white",
         "Left: measurement less what the filter expected, over its standard deviation; least and greatest value of "
         "pieces of the recording; band: ± 2. Right: correlation with itself some rows later; band: ± two standard "
         f"deviations of white noise, red beyond. Of {_LAGS} lags one or two lie beyond by chance; many, or a slow "
         f"fall, show what the model lacks. Beyond: {', '.join(beyond)}.",
-        image,
-        page,
+        panels,
+        0.72,
+        (4.05, 1.7),
+        0.18,
     )
 
 

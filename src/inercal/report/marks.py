@@ -34,6 +34,7 @@ class Dots:
     """Points ``x``, ``y`` (n,), with bars of half the length ``across`` (n,) or ``up`` (n,), both ways.
 
     ``edged`` points have an outline; ``values`` (n,) are shown by colour, on the scale of the `Colours` of the panel.
+    ``words`` (n,) are told where a mouse is over a point.
     """
 
     x: ArrayLike
@@ -48,6 +49,7 @@ class Dots:
     bar: str = ""
     edged: bool = False
     values: Array | None = None
+    words: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

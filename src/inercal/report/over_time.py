@@ -6,19 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
-from inercal.report.cells import Cell, band, frame, line
-from inercal.report.courses import grid
+from inercal.report.cells import small
+from inercal.report.courses import times
 from inercal.report.html import Picture
-from inercal.report.style import ALARM, COLOURS, INK, QUIET, envelope, svg
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from inercal.report.marks import Axis, Band, Bars, Level, Line, Mark, Panel, Strips
+from inercal.report.style import ALARM, COLOURS, INK, QUIET, envelope
 
 
 def known(x: Array) -> Array:
@@ -60,12 +58,9 @@ _NARROWEST = 1.0 / 600.0
 _DECADES = 6.0
 """Powers of ten that a logarithmic panel spans at most."""
 
-_TEXT = 0.066
-"""Width of a letter in the head of a panel [inch], about."""
-
 
 @dataclass(frozen=True, eq=False)
-class Panel:
+class Signals:
     """Lines (n,) over time by their names, with the ``label`` of their axis and a ``title`` above.
 
     ``band`` from (n,) to (n,); ``levels`` are drawn across, by their names; ``zero``: a line at 0, always in sight.
@@ -132,7 +127,7 @@ def over_time(
     title: str,
     caption: str,
     t: Array,
-    panels: Sequence[Panel],
+    panels: Sequence[Signals],
     marks: Marks | None = None,
     height: float = 0.95,
 ) -> Picture:
@@ -142,44 +137,31 @@ def over_time(
         t, panels = np.array([0.0, 1.0]), [replace(each, lines={}, band=None) for each in panels]
     cuts, pieces = np.searchsorted(t, marks.gaps[:, 1]), max(_FEWEST, min(_PIECES, _IN_ALL // len(panels)))
     late = t - t[0] >= min(marks.settling, 0.1 * float(t[-1] - t[0]))
-    with grid(t, len(panels), 1, height, 0.27) as (page, axes, places):
-        for k, (panel, place) in enumerate(zip(panels, places, strict=True)):
-            cell = replace(place, y=_limits(panel, late), scale=panel.scale)
-            _mark(axes, cell, marks)
-            frame(axes, cell, times=k == len(panels) - 1, label=panel.label)
-            _draw(axes, cell, panel, t, cuts, pieces)
-            head(axes, cell, panel.title, [*panel.lines] if len(panel.lines) > 1 else [])
-        image = svg(page)
-    return Picture(title, caption, image, page)
+    drawn = [
+        Panel(
+            [*_along(marks), *_marks(panel, t, cuts, pieces)],
+            times(t),
+            Axis(panel.label, panel.scale, _limits(panel, late)),
+            panel.title,
+        )
+        for panel in panels
+    ]
+    return small(title, caption, drawn, height, head=0.27)
 
 
-def head(axes: Axes, cell: Cell, title: str, names: Sequence[str]) -> None:
-    """The title of a panel at the left above it, and the names of its lines in their colours at the right."""
-    top, right = cell.bottom + cell.height + 0.045, cell.left + cell.width
-    axes.text(cell.left, top, title, fontsize=7.0, ha="left", va="bottom", color=INK)
-    for k, name in reversed(list(enumerate(names))):
-        colour = COLOURS[k % len(COLOURS)]
-        axes.text(right, top, name, fontsize=7.0, fontweight="bold", ha="right", va="bottom", color=colour)
-        right -= _TEXT * (len(name) + 2)
-
-
-def _draw(axes: Axes, cell: Cell, panel: Panel, t: Array, cuts: NDArray[np.int64], pieces: int) -> None:
+def _marks(panel: Signals, t: Array, cuts: NDArray[np.int64], pieces: int) -> list[Mark]:
     """Band, levels and lines of a panel."""
-    if panel.zero:
-        line(axes, cell, t[[0, -1]], np.zeros(2), color=QUIET, lw=0.6)
+    marks: list[Mark] = [Level(0.0)] if panel.zero else []
     if panel.band is not None:
         low, high = (thinned(t, each, cuts, pieces) for each in panel.band)
         if len(t) > 2 * pieces:  # the envelope of each edge goes down and up in turn
             low, high = (low[0][::2], low[1][::2]), (high[0][::2], high[1][1::2])
-        band(axes, cell, low[0], low[1], high[1], color=COLOURS[0], alpha=0.25)
-    for name, level in panel.levels.items():
-        line(axes, cell, t[[0, -1]], np.full(2, level), color=INK, lw=0.7, ls=(0, (4, 3)))
-        place = float(cell.up(np.array(level)))
-        if cell.bottom <= place <= cell.bottom + cell.height:
-            right = cell.left + cell.width
-            axes.text(right, place + 0.02, name, fontsize=6.5, ha="right", va="bottom", color=INK)
-    for k, values in enumerate(panel.lines.values()):
-        line(axes, cell, *thinned(t, values, cuts, pieces), color=COLOURS[k % len(COLOURS)], lw=0.7)
+        marks.append(Band(low[0], low[1], high[1], alpha=0.25))
+    marks += [Level(level, name, INK, 0.7, (0.0, (4.0, 3.0))) for name, level in panel.levels.items()]
+    for k, (name, values) in enumerate(panel.lines.items()):
+        said = name if len(panel.lines) > 1 else ""
+        marks.append(Line(*thinned(t, values, cuts, pieces), said, COLOURS[k % len(COLOURS)], 0.7))
+    return marks
 
 
 def thinned(t: Array, values: Array, cuts: NDArray[np.int64], pieces: int) -> tuple[Array, Array]:
@@ -200,7 +182,7 @@ def thinned(t: Array, values: Array, cuts: NDArray[np.int64], pieces: int) -> tu
     return np.concatenate(times[:-1]), np.concatenate(shown[:-1])
 
 
-def _limits(panel: Panel, late: Flags) -> tuple[float, float]:
+def _limits(panel: Signals, late: Flags) -> tuple[float, float]:
     """Limits of a y axis: what the lines span once settled, most of the band, and the levels."""
     values = [x[late] if np.isfinite(x[late]).any() else x for x in panel.lines.values()]
     spans = [(float(np.nanmin(x)), float(np.nanmax(x))) for x in map(_finite, values) if len(x)]
@@ -227,59 +209,42 @@ def _finite(x: Array) -> Array:
     return x[np.abs(x) < 1e100]
 
 
-def _mark(axes: Axes, cell: Cell, marks: Marks) -> None:
+def _along(marks: Marks) -> list[Mark]:
     """Stretches behind the lines, and dashes where an estimator started anew."""
-    for stretches, colour, alpha in (
-        (marks.moving, COLOURS[3], 0.14),
-        (marks.gaps, QUIET, 0.35),
-        (marks.saturated, ALARM, 0.22),
-    ):
-        strips(axes, cell, stretches, cell.bottom, cell.height, colour, alpha)
-    feet = cell.across(marks.restarts)
-    axes.vlines(feet, cell.bottom, cell.bottom + cell.height, color=INK, lw=0.7, ls=(0, (3, 2)))
-
-
-def strips(
-    axes: Axes, cell: Cell, stretches: Array, bottom: float, height: float, colour: str, alpha: float = 1.0
-) -> None:
-    """Stretches (k, 2) of the time of a panel as strips of that ``height`` [inch], cut off at its ends."""
-    if not len(stretches):
-        return
-    places = np.clip(cell.across(stretches), cell.left, cell.left + cell.width)
-    spans = [(float(a), float(b - a)) for a, b in places]
-    axes.broken_barh(spans, (bottom, height), color=colour, alpha=alpha, lw=0, zorder=0.5)
+    return [
+        Strips(marks.moving, COLOURS[3], 0.14),
+        Strips(marks.gaps, QUIET, 0.35),
+        Strips(marks.saturated, ALARM, 0.22),
+        *(Level(float(at), "", INK, 0.7, (0.0, (3.0, 2.0)), upright=True) for at in marks.restarts),
+    ]
 
 
 def measured(t: Array, names: Sequence[str], missing: Flags, saturated: Flags, marks: Marks) -> Picture:
     """Times in which each sensor measured: ``missing`` and ``saturated`` (n, k) of ``names`` over ``t`` (n,) [s]."""
-    height = 0.17
-    with grid(t, 1, 1, height * len(names), 0.1) as (page, axes, places):
-        cell = replace(places[0], y=(0.0, float(len(names))))
-        frame(axes, cell, times=True, ticks=[])
-        for k, name in enumerate(names):
-            bottom = cell.bottom + height * (len(names) - 1 - k)
-            axes.text(
-                cell.left - 0.06, bottom + 0.5 * height, name, fontsize=7.0, ha="right", va="center_baseline"
-            )
-            whole = np.array([[t[0], t[-1]]])
-            strips(axes, cell, whole, bottom + 0.03, height - 0.06, COLOURS[0], 0.3)
-            for flags, colour in ((missing[:, k] & ~saturated[:, k], QUIET), (saturated[:, k], ALARM)):
-                strips(axes, cell, stretches(t, flags), bottom + 0.03, height - 0.06, colour)
-            strips(axes, cell, marks.gaps, bottom + 0.02, height - 0.04, "white")
-        image = svg(page)
+    bars: list[Mark] = [_row(np.arange(len(names)), np.array([[t[0], t[-1]]] * len(names)), COLOURS[0], 0.3)]
+    for k in range(len(names)):
+        for flags, colour in ((missing[:, k] & ~saturated[:, k], QUIET), (saturated[:, k], ALARM)):
+            bars.append(_row(k, stretches(t, flags), colour))
+        bars.append(_row(k, marks.gaps, "white"))
     lost = [
         f"{name} {_percent(flags)} {word}"
         for k, name in enumerate(names)
         for word, flags in (("saturated", saturated[:, k]), ("missing", missing[:, k] & ~saturated[:, k]))
         if flags.any()
     ]
-    return Picture(
+    return small(
         "What was measured",
         "Blue: samples that count; red: saturated, left out; grey: missing; white: no rows. A strip is wide enough to "
         f"be seen, however short. {'; '.join(lost) + '.' if lost else ''}".rstrip(),
-        image,
-        page,
+        [Panel(bars, times(t), Axis(names=names))],
+        0.17 * len(names),
+        head=0.1,
     )
+
+
+def _row(at: int | NDArray[np.int64], spans: Array, colour: str, alpha: float = 1.0) -> Bars:
+    """Bars along the ``spans`` (k, 2) [s] of a row, or of rows."""
+    return Bars(np.broadcast_to(at, len(spans)), spans[:, 0], spans[:, 1], "", colour, 0.65, alpha=alpha)
 
 
 def _percent(flags: Flags) -> str:

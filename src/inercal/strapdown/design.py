@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from inercal.arrays import Array, short_repr
+from inercal.designs.search import Designed
 from inercal.errors import StudyError
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN
 from inercal.estimate.rounding import short
@@ -21,7 +22,7 @@ from inercal.records.places import counted, counted_names
 from inercal.strapdown.bounds import Pieces, PlanBounds, bounds
 from inercal.strapdown.coefficients import ALWAYS, group_of
 from inercal.strapdown.limits import LIMITS
-from inercal.strapdown.path_search import Ground, Path, attitudes, search
+from inercal.strapdown.path_search import Path, TurnGround, attitudes, search
 from inercal.strapdown.settings import Plan, StrapdownSettings
 from inercal.strapdown.simulate import AXES, start_attitude
 
@@ -83,22 +84,12 @@ class ComparedPlan:
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Designed:
-    """A plan, the first to ``compare`` with others of the same time: found by a search, or the study's own.
+class DesignedTurns(Designed[ComparedPlan]):
+    """A plan beside others of the same time: ``goal`` (q,) [SI] of each coefficient; ``tried`` paths, 0 without a
+    search."""
 
-    ``goal`` (q,) [SI] of each coefficient; ``tried`` paths, 0 without a search; ``message`` and ``findings`` in words.
-    """
-
-    compare: tuple[ComparedPlan, ...]
     goal: Array
     tried: int
-    message: str
-    findings: tuple[Finding, ...]
-
-    @property
-    def plan(self) -> Plan:
-        """The plan found, or the study's."""
-        return self.compare[0].plan
 
     @property
     def bounds(self) -> PlanBounds:
@@ -130,7 +121,7 @@ class Designed:
 
 def design(
     settings: StrapdownSettings, progress: Callable[[int, int], None] = lambda done, total: None
-) -> Designed:
+) -> DesignedTurns:
     """Judge the plan of a study by its bounds, and search for a better one where it has a ``design``.
 
     ``progress`` is told (done, total) of the random starts. Raises `StudyError` without turns and without a search, and
@@ -164,7 +155,7 @@ def design(
         f"{best.mean:.3g} times the goal in the geometric mean, and at most {best.ratio.max():.3g} times "
         f"({best.bounds.names[int(np.argmax(best.ratio))]})"
     )
-    return Designed(tuple(compared), goal, tried, message, _findings(best.bounds))
+    return DesignedTurns(tuple(compared), message, _findings(best.bounds), goal, tried)
 
 
 def _sound(along: PlanBounds) -> PlanBounds:
@@ -176,7 +167,7 @@ def _sound(along: PlanBounds) -> PlanBounds:
     return along
 
 
-def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
+def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> TurnGround:
     """The ground of a study's search; ``goal`` (q,). Raises `StudyError` where the turns leave no time for rests."""
     asked = pieces.settings.design
     assert asked is not None
@@ -185,7 +176,7 @@ def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
     starts = attitudes(given) if asked.start == "free" else (start_attitude(given),)
     least = given.time_of(angles[0])
     time = given.first_dwell + asked.turns * (given.dwell + least) if asked.time is None else asked.time
-    ground = Ground(pieces, starts, moves, asked.turns, goal, time, given.turn_time, given.first_dwell)
+    ground = TurnGround(pieces, starts, moves, asked.turns, goal, time, given.turn_time, given.first_dwell)
     if not ground.fits((0, ((0, angles[0]),) * asked.turns)):
         needed = given.first_dwell + asked.turns * (least + _shortest(pieces.settings))
         raise StudyError(
@@ -196,7 +187,7 @@ def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> Ground:
     return ground
 
 
-def _plan_of(ground: Ground, path: Path, given: Plan) -> Plan:
+def _plan_of(ground: TurnGround, path: Path, given: Plan) -> Plan:
     """A path as a plan."""
     start, turns = path
     return replace(given, turns=turns, start=angles_of(ground.starts[start]), dwell=ground.times(turns).dwell)
@@ -311,7 +302,7 @@ def _turns(plan: Plan, along: PlanBounds) -> Table:
     )
 
 
-def _bounds(designed: Designed) -> Table:
+def _bounds(designed: DesignedTurns) -> Table:
     """Bounds of each coefficient."""
     along, rows = designed.bounds, []
     for name, u, prior, goal in zip(
@@ -334,7 +325,7 @@ def unit_of(name: str) -> tuple[str, float]:
     return shown_unit("1") if of_itself else (unit, size)
 
 
-def _comparison(designed: Designed) -> Table:
+def _comparison(designed: DesignedTurns) -> Table:
     """Plans side by side."""
     rows = tuple(
         (
@@ -356,13 +347,13 @@ def _comparison(designed: Designed) -> Table:
     )
 
 
-def by_kind(designed: Designed) -> Mapping[str, Array]:
+def by_kind(designed: DesignedTurns) -> Mapping[str, Array]:
     """Largest u over the goal of each kind of coefficient after each rest (rests,)."""
     ratio, kinds = designed.bounds.history / designed.goal, [group_of(name) for name in designed.bounds.names]
     return {kind: np.max(ratio[:, [each == kind for each in kinds]], axis=1) for kind in dict.fromkeys(kinds)}
 
 
-def study_table(designed: Designed) -> str:
+def study_table(designed: DesignedTurns) -> str:
     """The plan as a table of a study."""
     plan = designed.plan
     turns = "".join(f'    ["{axis}", "{angle}"],\n' for axis, angle in stated_turns(plan))

@@ -14,7 +14,7 @@ from inercal.report.style import ALARM, COLOURS, envelope
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.strapdown.design import Designed
+    from inercal.strapdown.design import DesignedTurns
     from inercal.strapdown.task import StrapdownCalibration
 
 
@@ -79,7 +79,7 @@ def _rests(calibration: StrapdownCalibration) -> Picture:
     )
 
 
-def progress(designed: Designed) -> Picture:
+def progress(designed: DesignedTurns) -> Picture:
     """Largest u of each kind of coefficient, over its goal, after each rest of a plan."""
     from inercal.strapdown.design import by_kind
 
@@ -98,6 +98,6 @@ def progress(designed: Designed) -> Picture:
     )
 
 
-def design_page(designed: Designed, estimate: Estimate) -> str:
+def design_page(designed: DesignedTurns, estimate: Estimate) -> str:
     """The report of a design as one self-contained HTML page."""
     return render(estimate, [progress(designed)], "Turns of a strapdown unit", (), designed.tables())

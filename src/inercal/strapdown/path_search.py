@@ -1,8 +1,7 @@
-"""Searching for a path: turns and a first attitude, improved from random ones until no small change makes them better.
+"""Searching for a path (`inercal.designs.search`): a first attitude and turns.
 
-The changes tried are those of exchange algorithms (`inercal.designs.exchange`), for sequences: a turn replaced, two
-exchanged, one moved, the first attitude replaced. Paths of one search take the same time: longer turns leave less for
-the rests.
+The changes tried: a turn replaced, two exchanged, one moved, the first attitude replaced. Paths of one search take the
+same time: longer turns leave less for the rests.
 """
 
 from __future__ import annotations
@@ -10,20 +9,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from itertools import product
 from typing import TypeAlias
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.designs.search import from_starts, improved
 from inercal.geometry.rotations import elementary
 from inercal.strapdown.bounds import Pieces, Step, Times
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.settings import Plan
 from inercal.strapdown.simulate import start_attitude
 
-Path: TypeAlias = tuple[int, tuple[tuple[int, float], ...]]
-"""Number of the first attitude, and turns as axis 0 to 2 and angle [rad]."""
+Turns: TypeAlias = tuple[tuple[int, float], ...]
+"""Turns as axis 0 to 2 and angle [rad]."""
+
+Path: TypeAlias = tuple[int, Turns]
+"""Number of the first attitude, and the turns."""
+
+_KEPT = 1000
+"""Beginnings of paths of which the end is kept: some 10 MB."""
 
 
 def criterion(ratio: Array) -> float:
@@ -32,7 +39,7 @@ def criterion(ratio: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TurnGround:
     """The ground of a search: ``pieces`` of plans, ``starts`` (3, 3) that are allowed, ``moves`` (axis, angle), the
     ``number`` of turns, ``goal`` (q,), and of all paths the ``time`` [s], of turns by 90 deg and of the first rest."""
 
@@ -45,7 +52,7 @@ class Ground:
     turn_time: float
     first_dwell: float
 
-    def times(self, turns: tuple[tuple[int, float], ...]) -> Times:
+    def times(self, turns: Turns) -> Times:
         """Times of a path; its rests last as long as the turns leave."""
         turning = sum(abs(angle) for _, angle in turns) * self.turn_time / (0.5 * math.pi)
         dwell = float(self.time - self.first_dwell - turning) / max(len(turns), 1)
@@ -55,97 +62,57 @@ class Ground:
         """True where the turns leave time for rests."""
         return self.times(path[1]).dwell >= LIMITS.shortest_rest + 2.0 * self.pieces.settings.rests.margin
 
+    def first(self, rng: np.random.Generator) -> Path:
+        """A random path; of turns as short as there are where others do not fit."""
+        start = int(rng.integers(len(self.starts)))
+        turns = tuple(self.moves[int(k)] for k in rng.integers(len(self.moves), size=self.number))
+        if self.fits((start, turns)):
+            return start, turns
+        least = min(abs(angle) for _, angle in self.moves)
+        return start, tuple((axis, math.copysign(least, angle)) for axis, angle in turns)
 
-class Judge:
-    """The criterion of paths, computed from where each differs from the one last kept."""
+    def changes(self, path: Path) -> Iterator[Path]:
+        """Other paths that differ by one small change; not all of them fit."""
+        start, turns = path
+        changed = [(other, turns) for other in range(len(self.starts))]
+        for i, j in product(range(len(turns)), repeat=2):
+            if i < j:
+                changed.append((start, (*turns[:i], turns[j], *turns[i + 1 : j], turns[i], *turns[j + 1 :])))
+            if i != j:
+                rest = (*turns[:i], *turns[i + 1 :])
+                changed.append((start, (*rest[:j], turns[i], *rest[j:])))
+        for i, move in product(range(len(turns)), self.moves):
+            changed.append((start, (*turns[:i], move, *turns[i + 1 :])))
+        return (each for each in changed if each != path)
 
-    def __init__(self, ground: Ground) -> None:
-        self.ground = ground
-        self.values: dict[Path, float] = {}
-        self._steps: list[Step] = []
-        self._path: Path = (-1, ())
-        self._times: Times | None = None
-
-    def __call__(self, path: Path) -> float:
+    def value(self, path: Path) -> float:
         """Criterion of a path."""
-        if path not in self.values:
-            pieces = self.ground.pieces
-            P = pieces.covariance(self._along(path)[-1].information)
-            variance = np.diag(P)
-            sound = np.all(variance > 0.0)
-            self.values[path] = criterion(np.sqrt(variance) / self.ground.goal) if sound else math.inf
-        return self.values[path]
+        start, turns = path
+        P = self.pieces.covariance(self._after(start, turns, self.times(turns)).information)
+        variance = np.diag(P)
+        return criterion(np.sqrt(variance) / self.goal) if np.all(variance > 0.0) else math.inf
 
-    def keep(self, path: Path) -> None:
-        """Take a path as the one that those to come differ from."""
-        self._steps, self._path, self._times = self._along(path), path, self.ground.times(path[1])
+    @cached_property
+    def _after(self) -> Callable[[int, Turns, Times], Step]:
+        """The end of a path that begins so; of paths that begin alike the common part is computed once."""
 
-    def _along(self, path: Path) -> list[Step]:
-        """The path, after each of its rests."""
-        ground, (start, turns) = self.ground, path
-        times, same = ground.times(turns), 0
-        if start == self._path[0] and times == self._times:
-            same = 1
-            for one, other in zip(turns, self._path[1], strict=False):
-                if one != other:
-                    break
-                same += 1
-        steps = self._steps[:same] or ground.pieces.steps(ground.starts[start], (), times)
-        for axis, angle in turns[len(steps) - 1 :]:
-            steps.append(ground.pieces.after(steps[-1], axis, angle, times))
-        return steps
+        @lru_cache(maxsize=_KEPT)
+        def after(start: int, turns: Turns, times: Times) -> Step:
+            if not turns:
+                return self.pieces.steps(self.starts[start], (), times)[0]
+            return self.pieces.after(after(start, turns[:-1], times), *turns[-1], times)
+
+        return after
 
 
 def search(
-    ground: Ground, rng: np.random.Generator, progress: Callable[[int, int], None]
+    ground: TurnGround, rng: np.random.Generator, progress: Callable[[int, int], None]
 ) -> tuple[Path, int]:
     """The best path found, and the number of paths tried; ``progress`` is told (done, total) of the random starts."""
-    judge = Judge(ground)
-    progress(0, LIMITS.path_starts)
-    for done in range(LIMITS.path_starts):
-        improve(judge, random_path(ground, rng), rng)
-        progress(done + 1, LIMITS.path_starts)
-    return min(judge.values, key=lambda path: judge.values[path]), len(judge.values)
-
-
-def random_path(ground: Ground, rng: np.random.Generator) -> Path:
-    """A random path; of turns as short as there are where others do not fit."""
-    start = int(rng.integers(len(ground.starts)))
-    turns = tuple(ground.moves[int(k)] for k in rng.integers(len(ground.moves), size=ground.number))
-    if ground.fits((start, turns)):
-        return start, turns
-    least = min(abs(angle) for _, angle in ground.moves)
-    return start, tuple((axis, math.copysign(least, angle)) for axis, angle in turns)
-
-
-def improve(judge: Judge, path: Path, rng: np.random.Generator) -> None:
-    """Change a path as long as that makes it better."""
-    best, improved = judge(path), True
-    while improved:
-        improved = False
-        judge.keep(path)
-        changes = sorted(set(_changes(judge.ground, path)) - {path})
-        for k in rng.permutation(len(changes)).tolist():
-            candidate = changes[k]
-            if judge.ground.fits(candidate) and judge(candidate) < best:
-                path, best, improved = candidate, judge(candidate), True
-                judge.keep(path)
-                break
-
-
-def _changes(ground: Ground, path: Path) -> Iterator[Path]:
-    """Paths that differ by one small change; not all of them fit."""
-    start, turns = path
-    for other in range(len(ground.starts)):
-        yield other, turns
-    for i, j in product(range(len(turns)), repeat=2):
-        if i < j:
-            yield start, (*turns[:i], turns[j], *turns[i + 1 : j], turns[i], *turns[j + 1 :])
-        if i != j:
-            rest = (*turns[:i], *turns[i + 1 :])
-            yield start, (*rest[:j], turns[i], *rest[j:])
-    for i, move in product(range(len(turns)), ground.moves):
-        yield start, (*turns[:i], move, *turns[i + 1 :])
+    values: dict[Path, float] = {}
+    streams = (rng,) * LIMITS.path_starts  # one after the other, in this thread: a path tried is known to all
+    found = from_starts(lambda of: improved(ground, of, values), streams, progress=progress)
+    return min(found, key=lambda each: each[0])[1], len(values)
 
 
 def attitudes(plan: Plan) -> tuple[Array, ...]:

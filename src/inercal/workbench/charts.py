@@ -15,7 +15,9 @@ from inercal.arrays import Array
 from inercal.records.channels import sensor_and_axis
 from inercal.records.column import counted_rows
 from inercal.records.record import Record
+from inercal.report.marks import Axis, Level, Line, Mark, Note, Panel, Strips
 from inercal.report.style import ALARM, COLOURS, plain_unit
+from inercal.workbench import interactive
 
 PIECES = 1200
 """Pieces of a line, each shown by its least and greatest value: some of the pixels across a screen."""
@@ -23,9 +25,6 @@ PIECES = 1200
 BLOCK = 512
 """Samples whose least and greatest value is kept, so that a long recording is not gone through again."""
 
-
-_REST, _TURN = "rgba(68,170,153,0.16)", "rgba(238,136,102,0.10)"
-"""Shades of rests and of turns."""
 
 _MARKED, _SHADED = 60, 300
 """Most marks, and most rests, that are drawn."""
@@ -140,103 +139,28 @@ def figure(
     shown: Sequence[Course], span: tuple[float, float] | None = None, notes: Notes | None = None
 ) -> dict[str, Any]:
     """A figure of plotly with a panel for each sensor, one time axis with one cursor, and ``notes`` at their times."""
-    sensors = list(dict.fromkeys(course.sensor for course in shown))
-    begin, end = span or (None, None)
-    data = []
-    for course in shown:
-        t, values = line(course, begin, end)
-        axis = sensors.index(course.sensor) + 1
-        own = [each.name for each in shown if each.sensor == course.sensor]
-        data.append(
-            {
-                "type": "scattergl" if len(t) > 2 * PIECES else "scatter",
-                "mode": "lines+markers" if len(t) < 150 else "lines",
-                "name": course.name,
-                "x": t.tolist(),
-                "y": [None if np.isnan(value) else value for value in values.tolist()],
-                "yaxis": f"y{axis}" if axis > 1 else "y",
-                "line": {"width": 1, "color": COLOURS[own.index(course.name) % len(COLOURS)]},
-                "marker": {"size": 4},
-                "hovertemplate": f"%{{y:.6g}} {course.unit}",
-            }
-        )
-    return {"data": data, "layout": _layout(shown, sensors, span, notes or Notes()), "config": CONFIG}
+    across = Axis("time [s]" if all(course.rising for course in shown) else "row", limits=span)
+    panels = []
+    for sensor in dict.fromkeys(course.sensor for course in shown):
+        own = [course for course in shown if course.sensor == sensor]
+        marks = [
+            Line(*line(course, *(span or ())), course.name, COLOURS[k % len(COLOURS)], 1.0)
+            for k, course in enumerate(own)
+        ]
+        units = ", ".join(dict.fromkeys(course.unit for course in own))
+        panels.append(Panel(marks, across, Axis(f"{sensor} [{units}]")))
+    return interactive.figure(panels, 150.0, _over(notes or Notes(), span), unified=True)
 
 
-CONFIG = {
-    "displaylogo": False,
-    "responsive": True,
-    "scrollZoom": True,
-    "modeBarButtonsToRemove": ["lasso2d", "select2d"],
-}
-"""Behaviour of figures under the mouse."""
-
-
-def _bands(rests: Sequence[tuple[float, float]], span: tuple[float, float] | None) -> list[dict[str, Any]]:
-    """Shades behind rests, and of another colour behind the turns between them."""
+def _over(notes: Notes, span: tuple[float, float] | None) -> list[Mark]:
+    """Strips behind rests, and of another colour behind the turns between them; marks with their words."""
     begin, end = span or (-np.inf, np.inf)
-    inside = [(a, b) for a, b in rests if b >= begin and a <= end]
+    inside = [(a, b) for a, b in notes.rests if b >= begin and a <= end]
     inside = inside if len(inside) <= _SHADED else []
-    turns = [(a[1], b[0]) for a, b in pairwise(inside)]
-    return [
-        {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "layer": "below",
-         "line": {"width": 0}, "fillcolor": colour}
-        for colour, of in ((_REST, inside), (_TURN, turns))
-        for a, b in of
-    ]  # fmt: skip
-
-
-def _lines(marks: Mapping[float, str]) -> list[dict[str, Any]]:
-    """Lines at the times of marks."""
-    return [
-        {"type": "line", "xref": "x", "yref": "paper", "x0": t, "x1": t, "y0": 0, "y1": 1,
-         "line": {"color": ALARM, "width": 1, "dash": "dot"}}
-        for t in [*marks][:_MARKED]
-    ]  # fmt: skip
-
-
-def _layout(
-    shown: Sequence[Course],
-    sensors: Sequence[str],
-    span: tuple[float, float] | None,
-    notes: Notes,
-) -> dict[str, Any]:
-    """Panels one above the other, the time below, cursors on all of them."""
-    timed = all(course.rising for course in shown)
-    x: dict[str, Any] = {"title": {"text": "time [s]" if timed else "row"}, "anchor": f"y{len(sensors)}"}
-    if len(sensors) < 2:
-        x["anchor"] = "y"
-    x |= {"showspikes": True, "spikemode": "across", "spikethickness": 1, "spikesnap": "cursor"}
-    x["gridcolor"] = "rgba(128,128,128,0.25)"
-    if span is not None:
-        x |= {"range": list(span), "autorange": False}
-    layout: dict[str, Any] = {
-        "xaxis": x,
-        "hovermode": "x unified",
-        "dragmode": "zoom",
-        "uirevision": "kept",
-        "margin": {"l": 70, "r": 15, "t": 34, "b": 45},
-        "height": max(150 * len(sensors) + 84, 284),
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": "#7A858F"},
-        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
-        "hoversubplots": "axis",
-        "shapes": [*_bands(notes.rests, span), *_lines(notes.marks)],
-        "annotations": [
-            {"xref": "x", "yref": "paper", "x": t, "y": 1.0, "text": words, "showarrow": False, "textangle": -90,
-             "xanchor": "right", "yanchor": "top", "font": {"color": ALARM, "size": 10}}
-            for t, words in [*notes.marks.items()][:_MARKED]
-        ],
-    }  # fmt: skip
-    height = 1.0 / max(len(sensors), 1)
-    for k, sensor in enumerate(sensors):
-        units = dict.fromkeys(course.unit for course in shown if course.sensor == sensor)
-        layout["yaxis" if k == 0 else f"yaxis{k + 1}"] = {
-            "title": {"text": f"{sensor} [{', '.join(units)}]"},
-            "domain": [1.0 - (k + 0.9) * height, 1.0 - k * height],
-            "gridcolor": "rgba(128,128,128,0.25)",
-            "zeroline": False,
-            "automargin": True,
-        }
-    return layout
+    over: list[Mark] = [
+        Strips(inside, COLOURS[2], 0.16),
+        Strips([(a[1], b[0]) for a, b in pairwise(inside)], COLOURS[1], 0.1),
+    ]
+    for t, words in [*notes.marks.items()][:_MARKED]:
+        over += [Level(t, "", ALARM, upright=True), Note((t, 1.0), words, ALARM)]
+    return over

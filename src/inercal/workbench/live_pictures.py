@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from inercal.estimate.rounding import rounded, short
-from inercal.report.style import COLOURS
-from inercal.workbench.charts import CONFIG
+from inercal.report.marks import Axis, Band, Line, Mark, Panel
+from inercal.workbench import interactive
 
 POINTS = 1000
 """Points of a line at most: some of the pixels across a screen."""
@@ -32,58 +34,23 @@ def band(columns: Sequence[str], title: str) -> int | None:
 
 def figure(columns: Sequence[str], rows: Rows, title: str) -> dict[str, Any]:
     """The quantity of that title over time, with a band of two standard uncertainties where it has one."""
-    data: list[dict[str, Any]] = []
+    marks: list[Mark] = []
     places = drawable(columns)
     if title in places:
         some = rows[:: max(1, -(-len(rows) // POINTS))]
-        place, u = places[title], band(columns, title)
-        t, y = ([_number(row[k]) for row in some] for k in (0, place))
-        if u is not None:
-            half = [_number(row[u]) for row in some]
-            ends = [
-                [None if a is None or b is None else a + sign * 2.0 * b for a, b in zip(y, half, strict=True)]
-                for sign in (-1.0, 1.0)
-            ]
-            line = {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": t}
-            data += [
-                {**line, "y": ends[0], "showlegend": False},
-                {
-                    **line,
-                    "y": ends[1],
-                    "fill": "tonexty",
-                    "fillcolor": "rgba(68,119,170,0.25)",
-                    "name": "± U (k = 2)",
-                },
-            ]
-        data.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "name": title,
-                "x": t,
-                "y": y,
-                "line": {"width": 1.5, "color": COLOURS[0]},
-            }
+        t, y, u = (
+            np.array([math.nan if k is None else _number(row[k]) for row in some])
+            for k in (0, places[title], band(columns, title))
         )
-    axis = {"gridcolor": "rgba(128,128,128,0.25)", "zeroline": False, "automargin": True}
-    layout = {
-        "xaxis": {**axis, "title": {"text": columns[0] if columns else "t [s]"}},
-        "yaxis": {**axis, "title": {"text": title}},
-        "height": 320,
-        "margin": {"l": 70, "r": 15, "t": 34, "b": 45},
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": "#7A858F"},
-        "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
-        "uirevision": "kept",
-        "showlegend": True,
-    }
-    return {"data": data, "layout": layout, "config": CONFIG}
+        if band(columns, title) is not None:
+            marks.append(Band(t, y - 2.0 * u, y + 2.0 * u, "± U (k = 2)", alpha=0.25))
+        marks.append(Line(t, y, title, width=1.5))
+    return interactive.figure([Panel(marks, Axis(columns[0] if columns else "t [s]"), Axis(title))], 236.0)
 
 
-def _number(value: float | str | None) -> float | None:
-    """A finite number, else None."""
-    return value if isinstance(value, float | int) and math.isfinite(value) else None
+def _number(value: float | str | None) -> float:
+    """The number, NaN for what is none."""
+    return float(value) if isinstance(value, float | int) else math.nan
 
 
 def words_of(value: float | str | None, u: float | None) -> str:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from inercal.instruments.terms import shown_unit
-from inercal.report.style import COLOURS
+from inercal.report.marks import Axis, Dots, Level, Mark, Panel
+from inercal.report.style import ALARM, COLOURS
+from inercal.workbench import interactive
 
 
 @dataclass(frozen=True)
@@ -115,52 +117,24 @@ def _points(result: Mapping[str, Any]) -> Iterator[Part]:
 
 def figure(parts: Sequence[Part], chosen: str = "") -> dict[str, Any]:
     """Residuals over the time of the recording, a panel for each kind; the ``chosen`` one is marked."""
-    panels = list(dict.fromkeys(_panel(part) for part in parts))
-    height = 1.0 / max(len(panels), 1)
-    data = []
-    for part in parts:
-        axis = panels.index(_panel(part)) + 1
-        middles = [0.5 * (begin + end) for _, begin, end, _ in part.rows]
-        own = [each for each in parts if _panel(each) == _panel(part)]
-        colours = COLOURS[own.index(part) % len(COLOURS)]
-        data.append(
-            {
-                "type": "scatter", "mode": "markers", "name": part.what, "x": middles,
-                "y": [value for *_, value in part.rows], "yaxis": f"y{axis}" if axis > 1 else "y",
-                "customdata": [[label, begin, end] for label, begin, end, _ in part.rows],
-                "marker": {
-                    "color": ["#C03A2B" if label == chosen else colours for label, *_ in part.rows],
-                    "size": [13 if label == chosen else 8 for label, *_ in part.rows],
-                },
-                "hovertemplate": "%{customdata[0]}: %{y:.4g} " + part.unit + "<extra></extra>",
-            }
-        )  # fmt: skip
-    layout: dict[str, Any] = {
-        "xaxis": {
-            "title": {"text": "time [s]"},
-            "anchor": f"y{len(panels)}" if len(panels) > 1 else "y",
-            "gridcolor": "rgba(128,128,128,0.25)",
-            "zeroline": False,
-        },
-        "hovermode": "closest",
-        "uirevision": "kept",
-        "showlegend": len(parts) > len(panels),
-        "legend": {"orientation": "h", "y": 1.06},
-        "margin": {"l": 70, "r": 15, "t": 20, "b": 45},
-        "height": 210 * len(panels) + 60,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": "#7A858F"},
-    }
-    for k, panel in enumerate(panels):
-        layout["yaxis" if k == 0 else f"yaxis{k + 1}"] = {
-            "title": {"text": panel},
-            "domain": [1.0 - (k + 0.85) * height, 1.0 - k * height],
-            "gridcolor": "rgba(128,128,128,0.25)",
-            "zerolinecolor": "rgba(128,128,128,0.6)",
-            "automargin": True,
-        }
-    return {"data": data, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
+    panels = []
+    for title in dict.fromkeys(map(_panel, parts)):
+        own = [part for part in parts if _panel(part) == title]
+        marks: list[Mark] = [Level(0.0)]
+        for k, part in enumerate(own):
+            for alone in (False, True):
+                rows = [row for row in part.rows if (row[0] == chosen) == alone]
+                x, y = [0.5 * (begin + end) for _, begin, end, _ in rows], [value for *_, value in rows]
+                name = "" if alone or len(own) < 2 else part.what
+                colour, size = (ALARM, 13.0) if alone else (COLOURS[k % len(COLOURS)], 8.0)
+                marks.append(Dots(x, y, name, colour, size=size, words=[label for label, *_ in rows]))
+        panels.append(Panel(marks, Axis("time [s]"), Axis(title)))
+    return interactive.figure(panels, 210.0)
+
+
+def span_of(parts: Sequence[Part], label: str) -> tuple[float, float]:
+    """The stretch (begin, end) [s] of the residual of that label."""
+    return next((begin, end) for part in parts for name, begin, end, _ in part.rows if name == label)
 
 
 def _panel(part: Part) -> str:

@@ -24,7 +24,7 @@ from inercal.report.html import Picture, render
 from inercal.report.over_time import (
     Flags,
     Marks,
-    Panel,
+    Signals,
     gaps,
     known,
     largest,
@@ -129,11 +129,11 @@ def _angle(seen: Measurement, marks: Marks) -> Picture:
     title = f"u: median {middle(u):.2g}°, largest after the start {largest(u[settled(t)]):.2g}°"
     band = theta - 2.0 * u, theta + 2.0 * u
     panels = [
-        Panel("theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", band),
-        Panel("u of theta [°]", {"": u}, title, scale="log"),
+        Signals("theta [°]", {"": theta}, f"{angles.method}: {span(theta)}°", band),
+        Signals("u of theta [°]", {"": u}, title, scale="log"),
     ]
     if np.isfinite(rate).any():
-        panels.append(Panel("rate [°/s]", {"": rate}, f"rate: {span(rate)} °/s", zero=True))
+        panels.append(Signals("rate [°/s]", {"": rate}, f"rate: {span(rate)} °/s", zero=True))
     return over_time(
         "Angle, its uncertainty, and its rate",
         "Least and greatest value of pieces of the record, so that none is hidden. The band of ± two standard "
@@ -161,7 +161,10 @@ def _close_up(seen: Measurement) -> list[Picture]:
     lines = {"angle": theta[part]}
     if seen.recording.reference is not None:
         lines["reference"] = np.degrees(seen.recording.reference[part])
-    panels = [Panel("theta [°]", lines), Panel("rate [°/s]", {"": np.degrees(angles.rate[part])}, zero=True)]
+    panels = [
+        Signals("theta [°]", lines),
+        Signals("rate [°/s]", {"": np.degrees(angles.rate[part])}, zero=True),
+    ]
     return [
         over_time(
             "Close-up",
@@ -198,7 +201,7 @@ def _against_reference(seen: Measurement, marks: Marks) -> list[Picture]:
             "5 % would by chance. An error that stays when the model stops is a bias or an axis that is off; one that "
             f"goes with the rate is a delay.{marks.words}",
             t,
-            [Panel("error [°]", {"": error}, f"error: {span(error[late])}°", (-half, half), zero=True)],
+            [Signals("error [°]", {"": error}, f"error: {span(error[late])}°", (-half, half), zero=True)],
             replace(marks, moving=stretches(t, moving)),
             1.5,
         )
@@ -230,11 +233,11 @@ def _in_the_stream(seen: Measurement, settings: AoaSettings, marks: Marks) -> li
     ]
 
 
-def _banded(seen: Measurement, name: str, value: Array, u: Array) -> Panel:
+def _banded(seen: Measurement, name: str, value: Array, u: Array) -> Signals:
     """An angle [deg] with its band."""
     late = u[settled(seen.recording.t)]
     title = f"{name}: {span(value)}°, u median {middle(u):.2g}°, largest after the start {largest(late):.2g}°"
-    return Panel(f"{name} [°]", {"": value}, title, (value - 2.0 * u, value + 2.0 * u))
+    return Signals(f"{name} [°]", {"": value}, title, (value - 2.0 * u, value + 2.0 * u))
 
 
 def _fitted(seen: Measurement) -> list[Picture]:
@@ -281,7 +284,7 @@ def _compared(seen: Measurement, marks: Marks) -> list[Picture]:
     apart = {name: principal(theta - base) for name, theta in shown.items()}
     late = settled(t)
     sizes = np.array([[largest(x[late]), rms(x[late])] for x in apart.values()])
-    panels = [Panel("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
+    panels = [Signals("[°]", {"": np.degrees(x)}, name, zero=True) for name, x in apart.items()]
     return [
         side_by_side(tuple(apart), sizes[:, 0], sizes[:, 1], what),
         over_time(

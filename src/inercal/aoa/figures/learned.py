@@ -19,7 +19,7 @@ from inercal.instruments.terms import shown_unit
 from inercal.report import innovations as white_noise
 from inercal.report.courses import Course, converging, falling
 from inercal.report.html import Picture
-from inercal.report.over_time import Marks, Panel, largest, middle, over_time, rms
+from inercal.report.over_time import Marks, Signals, largest, middle, over_time, rms
 from inercal.units import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[P
         felt = {word: size for word, size in sizes.items() if size > _NO_FORCE}
         most = ", ".join(f"{word} {size:.3g} mg = {degrees * size:.2g}°" for word, size in felt.items())
         title = f"{name}, at most: {most}" if most else f"{name}: none"
-        panels.append(Panel(f"{name} [mg]", terms, title, zero=True))
+        panels.append(Signals(f"{name} [mg]", terms, title, zero=True))
     return [
         over_time(
             "What lever arms add to the readings",
@@ -86,7 +86,7 @@ def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, ma
         value, u, level = filtered.states[:, k] / _MG, filtered.states_u[:, k] / _MG, 2.0 * of.level / _MG
         title = f"{word} the model: {rms(value):.2g} mg rms, u {middle(u):.2g} mg; prior {0.5 * level:.2g} mg"
         band = value - 2.0 * u, value + 2.0 * u
-        panels.append(Panel(f"{axis} [mg]", {"": value}, title, band, {"": level, " ": -level}, zero=True))
+        panels.append(Signals(f"{axis} [mg]", {"": value}, title, band, {"": level, " ": -level}, zero=True))
     return [
         over_time(
             "Flexure of the sting",
@@ -172,8 +172,8 @@ def consistency(
         f"spikes, knocks, or lost rows.{marks.words}",
         at_middle,
         [
-            Panel("all", {"": together}, "all sensors", levels=limits, scale="log"),
-            Panel("each", by_sensor, "each sensor", levels={"": 1.0}, scale="log"),
+            Signals("all", {"": together}, "all sensors", levels=limits, scale="log"),
+            Signals("each", by_sensor, "each sensor", levels={"": 1.0}, scale="log"),
         ],
         replace(marks, gaps=np.empty((0, 2))),
     )

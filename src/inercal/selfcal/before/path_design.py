@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array, short_repr
+from inercal.designs.search import Designed
 from inercal.estimate.executors import Executor
 from inercal.findings import Finding
 from inercal.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
@@ -63,19 +64,10 @@ class ComparedPath:
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Designed:
-    """A path that was searched for, the first to ``compare`` with the study's own and the named ones that take no more
-    than its time, each with a rest at its end; a ``message`` on the search; ``findings``: coefficients that the path
-    cannot see, and gimbal lock where it comes close."""
-
-    compare: tuple[ComparedPath, ...]
-    message: str
-    findings: tuple[Finding, ...]
-
-    @property
-    def plan(self) -> Plan:
-        """The path found."""
-        return self.compare[0].plan
+class DesignedPath(Designed[ComparedPath]):
+    """A path that was searched for, beside the study's own and the named ones that take no more than its time, each
+    with a rest at its end. The findings: coefficients that the path cannot see, and gimbal lock where it comes
+    close."""
 
     @property
     def bounds(self) -> PathBounds:
@@ -113,7 +105,7 @@ def design(
     settings: SelfcalSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
     executor: Executor | None = None,
-) -> Designed:
+) -> DesignedPath:
     """Search for a path within rate, time and limits of the study, and set it beside others.
 
     Bounds are those of the nominal path: the prior of the coefficients is enough. ``progress`` is told (done, total)
@@ -141,7 +133,7 @@ def design(
         text = f"|cos| of the inner gimbal angle goes down to {lock:.2g} on the path found"
         near = [Finding("gimbal_lock", text, harm=())]
     by = {"worst": "largest u", "mean": "geometric mean of u"}[asked.criterion]
-    return Designed(
+    return DesignedPath(
         judged,
         f"up to {asked.turns} turns of multiples of {math.degrees(asked.angle):g} deg in {best.duration:g} s, by the "
         f"{by} over {'goal or prior' if settings.goal else 'prior'}{_counted(asked)}: {best.words()}",

@@ -1,24 +1,24 @@
-"""Searching for a path: sequences of turns, improved from random starts until no small change makes them better.
+"""Searching for a path (`inercal.designs.search`): sequences of turns, whole multiples of one angle.
 
-A sequence is judged by its bounds at coarser steps, with the noise of a sample taken down accordingly: its turns are
-whole multiples of one angle. The changes tried are those of exchange algorithms (`inercal.designs.exchange`), for
-sequences: a turn reversed, given to another joint, shortened or lengthened, two exchanged, one divided.
+A sequence is judged by its bounds at coarser steps, with the noise of a sample taken down accordingly. The changes
+tried: a turn reversed, given to another joint, shortened or lengthened, two exchanged, one divided.
 """
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.designs.search import from_starts, improved
 from inercal.errors import StudyError
-from inercal.estimate.executors import Executor, numbered
+from inercal.estimate.executors import Executor
 from inercal.selfcal.before.bounds import PathBounds, bounds
 from inercal.selfcal.before.left_out import LeftOut, left_out, shifts
 from inercal.selfcal.filters.problem import FilterProblem, problem
@@ -60,26 +60,18 @@ def search(
     Raises StudyError where no time is stated, or no turn fits into time and limits.
     """
     ground = _ground(settings)
-    streams = tuple(np.random.default_rng(settings.search.seed).spawn(LIMITS.path_starts))
-    found = numbered(_Starts(ground, streams), len(streams), executor, progress)
+    streams = np.random.default_rng(settings.search.seed).spawn(LIMITS.path_starts)
+    found = from_starts(partial(_from_start, ground), streams, executor, progress)
     return ground.plan(min(found)[1])
 
 
-@dataclass(frozen=True, eq=False)
-class _Starts:
-    """The best sequence from each random start, which draws from a stream of its own."""
-
-    ground: _Ground
-    streams: tuple[np.random.Generator, ...]
-
-    def __call__(self, number: int) -> tuple[float, Sequence]:
-        """Its criterion, and the sequence."""
-        rng = self.streams[number]
-        return _improved(self.ground, _random(self.ground, rng), rng)
+def _from_start(ground: PathGround, rng: np.random.Generator) -> tuple[float, Sequence]:
+    """The best sequence from a random start, after its criterion."""
+    return improved(ground, rng, {})
 
 
 @dataclass(frozen=True, eq=False)
-class _Ground:
+class PathGround:
     """The ground of a search: ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the
     start; ``number`` of angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these; the
     errors ``left_out`` that count, and what else limits the ``joints``."""
@@ -158,8 +150,53 @@ class _Ground:
         shifted = np.square(shifts(path, self.problem, self.left_out)).sum(axis=1)
         return criterion(bounds(path, self.problem), self.goal, self.asked.criterion, shifted)
 
+    def first(self, rng: np.random.Generator) -> Sequence:
+        """A random sequence that fits; of many tries the first that fills the time, or that fills it most."""
+        best: Sequence = ()
+        filled = 0.0
+        for _ in range(200):
+            ends = np.sort(rng.integers(0, self.number + 1, self.asked.turns - 1))
+            lengths = np.diff(ends, prepend=0, append=self.number)
+            turns: Sequence = ()
+            for length in lengths:
+                turns = _merged((*turns, (int(rng.integers(3)), int(length) * int(rng.choice((-1, 1))))))
+                while turns and not self.fits(turns):
+                    joint, count = turns[-1]
+                    turns = _merged((*turns[:-1], (joint, count - int(np.sign(count)))))
+            total = self.filled(turns)
+            if total > filled:
+                best, filled = turns, total
+            if filled == self.number:
+                break
+        return best
 
-def _ground(settings: SelfcalSettings) -> _Ground:
+    def changes(self, turns: Sequence) -> Iterator[Sequence]:
+        """Sequences that differ by one small change; not all of them fit."""
+        for i, (joint, count) in enumerate(turns):
+            before, after, sign = turns[:i], turns[i + 1 :], int(np.sign(count))
+            others = ((joint + 1) % 3, (joint + 2) % 3)
+            yield _merged((*before, (joint, -count), *after))
+            yield _merged((*before, (joint, count + sign), *after))
+            yield _merged((*before, (joint, count - sign), *after))
+            for other in others:
+                yield _merged((*before, (other, count), *after))
+            for j, (to, more) in enumerate(turns):
+                if j != i:
+                    longer = list(turns)
+                    longer[i], longer[j] = (joint, count - sign), (to, more + int(np.sign(more)))
+                    yield _merged(tuple(longer))
+                if j > i:
+                    exchanged = list(turns)
+                    exchanged[i], exchanged[j] = turns[j], turns[i]
+                    yield _merged(tuple(exchanged))
+            for first in range(1, abs(count)):
+                for other in others:
+                    for way in (1, -1):
+                        rest = way * (abs(count) - first)
+                        yield _merged((*before, (joint, sign * first), (other, rest), *after))
+
+
+def _ground(settings: SelfcalSettings) -> PathGround:
     """The ground of a study's search."""
     x, y, z = settings.fixed_angles.tolist()
     asked, model = settings.search, replace(settings.plan or Plan((), start=(x, y, z)), moves=())
@@ -178,7 +215,7 @@ def _ground(settings: SelfcalSettings) -> _Ground:
             "design.angle", f"{text}, expected at most {LIMITS.path_angles}: a larger angle, or less time"
         )
     low, high = _limits(settings, model)
-    made = _Ground(
+    made = PathGround(
         asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal, left_out(settings),
         settings.joints,
     )  # fmt: skip
@@ -218,68 +255,6 @@ def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
     ends = np.array([limits.get(joint, free) for joint in JOINTS]) - np.array(model.start)[:, None]
     slack = 1e-9
     return ends[:, 0] / settings.search.angle - slack, ends[:, 1] / settings.search.angle + slack
-
-
-def _random(ground: _Ground, rng: np.random.Generator) -> Sequence:
-    """A random sequence that fits; of many tries the first that fills the time, or that fills it most."""
-    best: Sequence = ()
-    filled = 0.0
-    for _ in range(200):
-        ends = np.sort(rng.integers(0, ground.number + 1, ground.asked.turns - 1))
-        lengths = np.diff(ends, prepend=0, append=ground.number)
-        turns: Sequence = ()
-        for length in lengths:
-            turns = _merged((*turns, (int(rng.integers(3)), int(length) * int(rng.choice((-1, 1))))))
-            while turns and not ground.fits(turns):
-                joint, count = turns[-1]
-                turns = _merged((*turns[:-1], (joint, count - int(np.sign(count)))))
-        total = ground.filled(turns)
-        if total > filled:
-            best, filled = turns, total
-        if filled == ground.number:
-            break
-    return best
-
-
-def _improved(ground: _Ground, turns: Sequence, rng: np.random.Generator) -> tuple[float, Sequence]:
-    """A sequence changed as long as that makes it better, with its criterion."""
-    value = functools.cache(ground.value)
-    best, improved = value(turns), True
-    while improved:
-        improved = False
-        changes = sorted(set(_changes(turns)))
-        for k in rng.permutation(len(changes)):
-            candidate = changes[k]
-            if ground.fits(candidate) and value(candidate) < best:
-                turns, best, improved = candidate, value(candidate), True
-                break
-    return best, turns
-
-
-def _changes(turns: Sequence) -> Iterator[Sequence]:
-    """Sequences that differ by one small change; not all of them fit."""
-    for i, (joint, count) in enumerate(turns):
-        before, after, sign = turns[:i], turns[i + 1 :], int(np.sign(count))
-        others = ((joint + 1) % 3, (joint + 2) % 3)
-        yield _merged((*before, (joint, -count), *after))
-        yield _merged((*before, (joint, count + sign), *after))
-        yield _merged((*before, (joint, count - sign), *after))
-        for other in others:
-            yield _merged((*before, (other, count), *after))
-        for j, (to, more) in enumerate(turns):
-            if j != i:
-                longer = list(turns)
-                longer[i], longer[j] = (joint, count - sign), (to, more + int(np.sign(more)))
-                yield _merged(tuple(longer))
-            if j > i:
-                exchanged = list(turns)
-                exchanged[i], exchanged[j] = turns[j], turns[i]
-                yield _merged(tuple(exchanged))
-        for first in range(1, abs(count)):
-            for other in others:
-                for way in (1, -1):
-                    rest = way * (abs(count) - first)
-                    yield _merged((*before, (joint, sign * first), (other, rest), *after))
 
 
 def _merged(turns: Sequence) -> Sequence:

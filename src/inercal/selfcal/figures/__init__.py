@@ -10,7 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.geometry.rotations import boxminus
 from inercal.report.coefficients import budget, correlation
-from inercal.report.courses import Course, Line, converging, falling, lines_by_group
+from inercal.report.courses import Course, converging, falling, lines_by_group
 from inercal.report.html import Picture, render
 from inercal.report.innovations import innovations, nis
 from inercal.selfcal.figures.filters import (
@@ -161,14 +161,11 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     reference = values[-1] if truth is None else truth[: values.shape[1]]
     what = "change still to come" if truth is None else "error"
 
-    def lines(group: slice) -> list[Line]:
-        return [
-            Line(
-                EXTENDED[k],
-                100.0 * (values[:, k] - reference[k]) / (abs(reference[k]) or np.nan),
-            )
+    def lines(group: slice) -> dict[str, Array]:
+        return {
+            EXTENDED[k]: 100.0 * (values[:, k] - reference[k]) / (abs(reference[k]) or np.nan)
             for k in range(group.start, group.stop)
-        ]
+        }
 
     end = "its last value" if truth is None else "the truth"
     return lines_by_group(

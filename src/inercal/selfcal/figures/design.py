@@ -17,11 +17,11 @@ from inercal.selfcal.result.tables import bounds_by_path, paths, turns, weak_com
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.selfcal.before.path_design import Designed
+    from inercal.selfcal.before.path_design import DesignedPath
     from inercal.selfcal.settings import SelfcalSettings
 
 
-def main(designed: Designed) -> Picture:
+def main(designed: DesignedPath) -> Picture:
     """The main picture: the path found."""
     plan = designed.plan
     angles = plan.angles()
@@ -29,7 +29,7 @@ def main(designed: Designed) -> Picture:
     return path_of(t, angles, "The path found", "Gimbal angles")
 
 
-def page(designed: Designed, settings: SelfcalSettings, estimate: Estimate) -> str:
+def page(designed: DesignedPath, settings: SelfcalSettings, estimate: Estimate) -> str:
     """The report of a search for a path as one self-contained HTML page."""
     bounds, plan = designed.bounds, designed.plan
     units, size = shown_units(bounds.names)

@@ -8,7 +8,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.rounding import rounded
-from inercal.report.courses import Line, panels_of_lines, path, turning
+from inercal.report.courses import panels_of_lines, path, turning
 from inercal.report.html import Picture
 from inercal.report.marks import Axis, Dots, Level, Mark, Panel, Strips
 from inercal.report.panels import draw
@@ -93,16 +93,14 @@ def _components(
     largest = max((float(e.max(initial=0.0)) for e in finite), default=0.0)
     power = 3 * int(np.floor(np.log10(largest) / 3.0)) if 0.0 < largest < 1e100 else 0
     unit = f" [{power_of_ten(10.0**power)}]" if power else ""
-    panels = {
-        f"q{k}{unit}": [Line(label, e[:, k] / 10.0**power) for label, e in errors.items()] for k in range(4)
-    }
+    panels = {f"q{k}{unit}": {label: e[:, k] / 10.0**power for label, e in errors.items()} for k in range(4)}
     rms = "; ".join(
         f"{label} " + ", ".join(f"{x:.1e}" for x in np.sqrt(np.nanmean(np.square(e), axis=0)))
         for label, e in errors.items()
     )
     dots = " Dotted: changes of the turn." if changes else ""
     text = f"{caption}{dots} Root mean square of q0, q1, q2, q3: {rms}."
-    return panels_of_lines(title, text, t, panels, changes)
+    return panels_of_lines(title, text, t, panels, changes=changes)
 
 
 def attitude_correction(
@@ -111,11 +109,12 @@ def attitude_correction(
     """Rotation (n, 3) [rad] from the encoders' attitude to the estimated one, about the axes of p, over ``t`` (n,) [s],
     with the standard uncertainties ``u`` (n, 3) [rad] of the estimate; dots at the ``changes`` [s] of the turn."""
     arcsec = np.radians(1.0 / 3600.0)
-    bands = [None] * 3 if u is None else list(2.0 * u.T / arcsec)
+    labels = [f"about {axis}_p [″]" for axis in "XYZ"]
     panels = {
-        f"about {axis}_p [″]": [Line("estimate less encoders", correction[:, k] / arcsec, bands[k])]
-        for k, axis in enumerate("XYZ")
+        label: {"estimate less encoders": about / arcsec}
+        for label, about in zip(labels, correction.T, strict=True)
     }
+    halves = {} if u is None else dict(zip(labels, 2.0 * u.T / arcsec, strict=True))
     band = " Band: ± two standard uncertainties of the estimate." if u is not None else ""
     return panels_of_lines(
         "Attitude against the encoders",
@@ -123,6 +122,7 @@ def attitude_correction(
         f"seconds of arc: mostly the noise of the encoders.{band}",
         t,
         panels,
+        halves,
         changes,
     )
 

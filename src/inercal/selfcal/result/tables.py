@@ -20,7 +20,7 @@ from inercal.selfcal.result.comparison import attitude_errors, with_stated
 
 if TYPE_CHECKING:
     from inercal.selfcal.before.bounds import PathBounds
-    from inercal.selfcal.before.path_design import Designed
+    from inercal.selfcal.before.path_design import DesignedPath
     from inercal.selfcal.monte_carlo import Campaign
 
 _WEAKEST = 6
@@ -198,7 +198,7 @@ def turns(plan: Plan) -> Table:
     )
 
 
-def paths(designed: Designed) -> Table:
+def paths(designed: DesignedPath) -> Table:
     """The path found beside others of the same time."""
     rows, robust = [], any(each.left_out for each in designed.compare)
     for each in designed.compare:
@@ -232,7 +232,7 @@ def paths(designed: Designed) -> Table:
     )
 
 
-def bounds_by_path(designed: Designed) -> Table:
+def bounds_by_path(designed: DesignedPath) -> Table:
     """Bounds of every path, in units of the field."""
     bounds, first = [each.observability.bounds for each in designed.compare], designed.compare[0]
     units, size = shown_units(bounds[0].names)

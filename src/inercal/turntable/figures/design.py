@@ -20,11 +20,11 @@ from inercal.turntable.figures.table import factor_rows, rig, rig_facts
 
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
-    from inercal.turntable.positions.planning import Designed
+    from inercal.turntable.positions.planning import DesignedPositions
     from inercal.turntable.settings import TurntableSettings
 
 
-def main(designed: Designed, settings: TurntableSettings) -> Picture:
+def main(designed: DesignedPositions, settings: TurntableSettings) -> Picture:
     """The picture that answers the question: where gravity lies on the instrument in the positions chosen."""
     angles, chain = designed.plan.angles, settings.chain
     return draw(
@@ -37,9 +37,9 @@ def main(designed: Designed, settings: TurntableSettings) -> Picture:
     )
 
 
-def page(designed: Designed, settings: TurntableSettings, estimate: Estimate) -> str:
+def page(designed: DesignedPositions, settings: TurntableSettings, estimate: Estimate) -> str:
     """The report of a search for positions as one self-contained HTML page."""
-    judged, unit = designed.judged, designed.unit
+    judged, unit = designed.compare, designed.unit
     names, shown = list(designed.units), [shown_unit(text, unit) for text in designed.units.values()]
     units, scale = [text for text, _ in shown], np.array([size for _, size in shown])
     u = [
@@ -92,7 +92,7 @@ def _stated_or(u: float, name: str, fitted: Sequence[str]) -> str:
 
 
 def _design_pictures(
-    designed: Designed,
+    designed: DesignedPositions,
     settings: TurntableSettings,
     names: Sequence[str],
     units: Sequence[str],
@@ -114,10 +114,10 @@ def _design_pictures(
             "not identify a term, or takes it as stated, has no mark there.",
             names,
             units,
-            {each.plan.name: values for each, values in zip(designed.judged, u, strict=True)},
+            {each.plan.name: values for each, values in zip(designed.compare, u, strict=True)},
         )
     )
-    shared = [each for each in designed.judged if each.drift_shares]
+    shared = [each for each in designed.compare if each.drift_shares]
     if shared:
         pictures.append(
             heat(

@@ -16,6 +16,7 @@ from inercal.designs.candidates import Candidates
 from inercal.designs.comparison import PlanFigures, judge
 from inercal.designs.criteria import Criterion, D, a_criterion, i_criterion
 from inercal.designs.exchange import exchange
+from inercal.designs.search import Designed
 from inercal.errors import StudyError
 from inercal.estimate.executors import Executor
 from inercal.findings import Finding
@@ -65,33 +66,12 @@ class JudgedPlan:
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Designed:
-    """A plan that was searched for.
+class DesignedPositions(Designed[JudgedPlan]):
+    """Positions that were searched for, u in SI; SI ``units`` of each coefficient, and the ``unit`` of the outputs for
+    people; ``result`` is the command's part of the JSON result."""
 
-    Attributes
-    ----------
-    plan : Plan
-        The positions chosen.
-    judged : tuple of JudgedPlan
-        The chosen plan first, then those it is compared with; u in SI.
-    units : mapping
-        SI unit of each coefficient.
-    unit : Unit
-        Of the outputs, for people.
-    message : str
-        The search, in words.
-    findings : tuple of Finding
-        Findings about the plan.
-    result : mapping
-        The command's part of the JSON result.
-    """
-
-    plan: Plan
-    judged: tuple[JudgedPlan, ...]
     units: Mapping[str, str]
     unit: Unit
-    message: str
-    findings: tuple[Finding, ...]
     result: dict[str, Any]
 
     def table(self) -> str:
@@ -109,7 +89,7 @@ def design(
     settings: TurntableSettings,
     progress: Callable[[str], None] = lambda _: None,
     executor: Executor | None = None,
-) -> Designed:
+) -> DesignedPositions:
     """Search for positions, and set the best beside other plans.
 
     Parameters
@@ -163,9 +143,8 @@ def design(
     judged = tuple(_judged(plan, settings, model) for plan in plans)
     findings += _of_site(judged[0], settings)
     unit = settings.instrument.unit.si
-    return Designed(
-        plan=plans[0],
-        judged=judged,
+    return DesignedPositions(
+        compare=judged,
         units={symbol: unit_of_term(symbol, unit) for symbol in model.symbols},
         unit=settings.instrument.unit,
         message=f"{asked.positions} of {int(mask.sum())} candidates, {plans[0].name}",
@@ -316,14 +295,14 @@ def _entry(judged: JudgedPlan) -> dict[str, Any]:
     }
 
 
-def _comparison(designed: Designed) -> list[str]:
+def _comparison(designed: DesignedPositions) -> list[str]:
     """Lines of the comparison table."""
-    wide = max(len(each.plan.name) for each in designed.judged)
+    wide = max(len(each.plan.name) for each in designed.compare)
     unit = designed.unit
     lines = [
         f"{'plan':<{wide}}  positions     rank  condition  D-efficiency  earth rate  rms u of output [{unit.symbol}]"
     ]
-    for each in designed.judged:
+    for each in designed.compare:
         figures = each.figures
         rank = f"{figures.rank}/{each.terms}"
         condition = f"{figures.condition:9.2f}" if np.isfinite(figures.condition) else "        –"
@@ -332,7 +311,7 @@ def _comparison(designed: Designed) -> list[str]:
             f"{each.plan.name:<{wide}}  {len(each.plan):9d}  {rank:>7}  {condition}  {figures.d_efficiency:12.4f}  "
             f"{each.earth_rate:>10}  {rms}"
         )
-    if len({each.earth_rate for each in designed.judged}) > 1:
+    if len({each.earth_rate for each in designed.compare}) > 1:
         lines.append(
             "where the earth rate is stated, its terms are taken as known: fewer coefficients to share the readings"
         )

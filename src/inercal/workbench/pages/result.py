@@ -29,7 +29,7 @@ from inercal.workbench.pages.frame import (
     table,
     told,
 )
-from inercal.workbench.residuals import figure, parts_of
+from inercal.workbench.residuals import figure, parts_of, span_of
 from inercal.workbench.sessions import Session
 
 
@@ -127,12 +127,13 @@ def _residuals(session: Session, result: Result) -> None:
         points = event.args.get("points") if isinstance(event.args, dict) else None
         if not points:
             return
-        label, begin, end = points[0]["customdata"]
-        margin = 0.5 * (float(end) - float(begin)) + 1.0
-        plot.update_figure(figure(parts, str(label)))
+        label = str(points[0]["customdata"])
+        begin, end = span_of(parts, label)
+        margin = 0.5 * (end - begin) + 1.0
+        plot.update_figure(figure(parts, label))
         place.clear()
         with place:
-            target = urlencode({"begin": float(begin) - margin, "end": float(end) + margin})
+            target = urlencode({"begin": begin - margin, "end": end + margin})
             ui.link(
                 f"Samples of {label}, {begin:.5g} s to {end:.5g} s",
                 f"/sessions/{session.id}/recording?{target}",
