@@ -244,7 +244,7 @@ def _assembled(
         told = (f for f in each.estimate.findings if f.code not in _OF_ONE)
         findings += [replace(f, message=f"{part.name}: {f.message}") for f in told]
     goal = reached(fit.names, uncertainty.u, settings.goal)
-    findings += [*at_prior(judged.left_at_prior), *missed(goal, UNIT_OF)]
+    findings += [*at_prior(judged.at_prior), *missed(goal, UNIT_OF)]
     findings += exact_inputs(exact, cure="state them with uncertainties, or as states")
     basis = studied(
         COMMAND,

@@ -92,7 +92,7 @@ def static_fit(recording: Recording, settings: AoaSettings, points: Sequence[Str
     if len(good) > 1:
         x[at], P[at, at] = float(good.mean()), float(good.var(ddof=1)) / len(good)
     more = learned(P, wide, names)
-    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    unseen = tuple(more.at_prior(1.0 / LIMITS.widened_prior))
     rows = int(np.isfinite(recording.reference).sum())
     return Verified(names, units, x, P, more, unseen, np.full(n + 1, np.nan), sigma, rows, True)
 

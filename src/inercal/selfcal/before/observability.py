@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.estimate.identifiability import UNSEEN, Learned, learned
 from inercal.estimate.remarks import Goal, at_prior, missed, reached
 from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
@@ -37,21 +37,15 @@ class Observability:
         return int(np.sum(self.learned.left <= UNSEEN))
 
     @property
-    def at_prior(self) -> tuple[str, ...]:
-        """Names of the coefficients that the path leaves at their prior."""
-        return tuple(self.left_at_prior)
-
-    @property
-    def left_at_prior(self) -> Mapping[str, float]:
-        """Part of the prior that is left of each of these."""
-        ratio = zip(self.learned.names, self.learned.ratio.tolist(), strict=True)
-        return {name: left for name, left in ratio if left > HALF_SEEN}
+    def at_prior(self) -> Mapping[str, float]:
+        """Coefficients that the path leaves at their prior, and the part of it that is left."""
+        return self.learned.at_prior()
 
     def findings(self) -> tuple[Finding, ...]:
         """A finding for each coefficient at its prior, or wider than wanted."""
         hints = {name: f"u = {size} {unit}" for name, size, unit in self._shown()}
-        wide = {name: goal for name, goal in self.goal.items() if name not in self.left_at_prior}
-        return (*at_prior(self.left_at_prior, hints), *missed(wide, UNIT_OF))
+        wide = {name: goal for name, goal in self.goal.items() if name not in self.at_prior}
+        return (*at_prior(self.at_prior, hints), *missed(wide, UNIT_OF))
 
     def worst(self, count: int = 3) -> list[str]:
         """The worst-known combinations in words, with the share of its prior that is left of each."""

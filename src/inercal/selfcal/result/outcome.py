@@ -135,7 +135,7 @@ def assemble(
     result["goal"] = reached(filtered.names, u, settings.goal)
     hints = _hardly_turned(recording, settings)
     # of biases that walk no recording tells more
-    left = {name: part for name, part in judged.left_at_prior.items() if KIND_OF[name] not in BIAS_WALK}
+    left = {name: part for name, part in judged.at_prior.items() if KIND_OF[name] not in BIAS_WALK}
     all_findings += at_prior(left, hints)
     limit = _limit(agreement, recording, settings)
     status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
