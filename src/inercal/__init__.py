@@ -57,8 +57,8 @@ Map, lower floors first; each imports only from those above its own line
     records                    record, column, channels, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
     estimate                   result, budget, runs, coverage, files, repeat, compare, effects,
-                               checkpoint, consistency, identifiability, hypotheses; kernels: factor, sigma_point,
-                               kalman
+                               checkpoint, consistency, identifiability, hypotheses, variances, remarks; kernels:
+                               factor, sigma_point, kalman
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
     designs                    candidates, criteria, exchange, search, comparison

@@ -141,3 +141,13 @@ def test_results_without_an_uncertainty_are_judged_by_their_scatter():
     assert not chart(series).alarms.any()
     still = Series(np.arange(4.0), np.ones(4), np.zeros(4), np.zeros(4))
     assert wandering(still).at(5.0).value == pytest.approx(1.0)
+
+
+def test_results_of_which_all_of_u_is_in_common_are_judged_by_their_scatter():
+    """A common part that is a million times the scatter, as of a laboratory's reference, adds to the value alone."""
+    t, y = np.arange(5.0), 9.8 + 1e-6 * np.array([0.0, 1.0, -1.0, 2.0, 1.0])
+    none = np.zeros(5)
+    found, without = (wandering(Series(t, y, none, none + common)) for common in (1.0, 0.0))
+    assert found.drift.value == pytest.approx(without.drift.value, rel=0.3)
+    assert pytest.approx(without.drift.U, rel=0.3) == found.drift.U
+    assert found.at(4.0).U > 1.9

@@ -105,6 +105,15 @@ def test_walks_are_found(times):
     assert (found.gain > chi2.ppf(0.999, 2)) == (times > 1.0)
 
 
+def test_noise_that_is_found_is_no_less_likely_than_hardly_any():
+    """Walks and turns together: the search does not end in a corner."""
+    samples, nodes = run(TACTICAL, 4)
+    settings, names = without(TACTICAL, *WALKS, *TURN_NOISE), (*WALKS, *TURN_NOISE)
+    found = with_noise(samples, nodes, settings, fit(samples, nodes, settings), names)
+    assert found is not None
+    assert found.gain > 0.0
+
+
 def test_what_the_size_of_a_walk_leaves_open_is_in_u():
     """Against a sum over two hundred sizes up to where none is likely; the likeliest alone knows too much."""
     samples, nodes = run(MEMS, 4)

@@ -72,7 +72,7 @@ def test_a_calibration_names_the_terms_that_the_site_rules():
     assert {"k_x", "DX_X"} <= set(ruled) < set(found.names)
     assert remarks(found.findings) == [
         f"u of {', '.join(ruled)} is mostly of what [site] states (latitude): with an exact site it would be less than "
-        "half"
+        "50 % of that"
     ]
     assert not remarks(exact.findings)
 

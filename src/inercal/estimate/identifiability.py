@@ -128,9 +128,10 @@ class Learned:
         """Part left of the worst-known combination over that of the best-known."""
         return float(self.left[0] / self.left[-1])
 
-    def at_prior(self, part: float = 0.5) -> tuple[str, ...]:
-        """Names of the parameters of which more than this part of the prior is left."""
-        return tuple(name for name, ratio in zip(self.names, self.ratio, strict=True) if ratio > part)
+    def at_prior(self, part: float = HALF_SEEN) -> dict[str, float]:
+        """Parameters of which more than this part of the prior is left, and what is left of it."""
+        ratios = zip(self.names, self.ratio.tolist(), strict=True)
+        return {name: ratio for name, ratio in ratios if ratio > part}
 
     def weakest(self, count: int = 1) -> tuple[str, ...]:
         """The worst-known combinations in words; terms count by their size over the prior."""

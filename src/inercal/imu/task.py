@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.errors import StudyError
+from inercal.estimate.remarks import exact_gravity
 from inercal.estimate.result import judged
 from inercal.findings import Finding
 from inercal.imu.limits import LIMITS
@@ -91,9 +92,11 @@ def calibrate_files(
     calibration = _by_method(records, settings, progress)
     if not rate_u and not settings.time_base_u and not in_rows(settings):
         calibration = _with_exact_clock(calibration, typed=rate_u is not None)
-    if settings.site.inputs or in_order(settings):
+    exact = exact_gravity(settings.site, "the scale factors are too sure by what it is not")
+    if in_order(settings) or not exact:
         return calibration
-    return _with_exact_gravity(calibration, settings.site.gravity)
+    findings = (*calibration.estimate.findings, *exact)
+    return replace(calibration, estimate=replace(calibration.estimate, findings=findings))
 
 
 def _by_method(
@@ -151,16 +154,6 @@ def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:
         estimate.names,
     )
     return replace(calibration, estimate=replace(estimate, findings=findings, status=status, message=message))
-
-
-def _with_exact_gravity(calibration: Calibrated, gravity: float) -> Calibrated:
-    """The calibration, saying that gravity without an uncertainty was taken as it stands."""
-    text = (
-        f"gravity is taken as exactly {gravity:.6g} m/s^2, and the scale factors are too sure by what it is not: state "
-        'it with its uncertainty, such as gravity = "9.81(1) m/s^2", or the latitude and height in its place'
-    )
-    findings = (*calibration.estimate.findings, Finding("stated_exact", text))
-    return replace(calibration, estimate=replace(calibration.estimate, findings=findings))
 
 
 def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:

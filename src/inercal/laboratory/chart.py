@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from inercal.arrays import Array
+from inercal.estimate.variances import solved, weighed
 from inercal.laboratory.wander import Series, prior_of
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -96,13 +97,10 @@ def _expected(series: Series, k: int) -> tuple[Array, Array, Array]:
     sizes = np.concatenate([[0.0], np.geomspace(0.03 * series.scale, largest, _GRID)])
     prior = prior_of(sizes / series.scale, 1.0)
     variances = np.maximum(own**2 + sizes[:, None] ** 2, 1e-300)
-    information = (1.0 / variances).sum(axis=1)
-    means = (y / variances).sum(axis=1) / information
-    chi2 = ((y - means[:, None]) ** 2 / variances).sum(axis=1)
-    logs = -0.5 * (np.log(variances).sum(axis=1) + np.log(information) + chi2) + np.log(prior)
-    weights = np.exp(logs - logs.max())
-    sigmas = np.sqrt(1.0 / information + series.own[k] ** 2 + sizes**2)
-    return weights / weights.sum(), means, sigmas
+    fit = solved(np.stack(np.broadcast_arrays(1.0, y), axis=-1) / np.sqrt(variances)[..., None])
+    weights = weighed(fit.likelihood(np.log(variances).sum(axis=1)) + np.log(prior))
+    sigmas = np.sqrt(fit.inverse[:, 0, 0] ** 2 + series.own[k] ** 2 + sizes**2)
+    return weights, fit.x[:, 0], sigmas
 
 
 def _quantiles(weights: Array, means: Array, sigmas: Array, p: float) -> Array:

@@ -7,14 +7,14 @@ The value x at time t, and what a calibration finds of it, are
 
 with c_k the part of u that all calibrations have in common (gravity, a table), v_k the rest of u, and e_k noise of
 variance s^2 beyond u (mounting, switching on). a and b have no prior: the likelihood of the variances q and s^2 is the
-restricted one (Patterson and Thompson 1971), and values are best linear unbiased predictions, as of a Kalman smoother
+restricted one (`inercal.estimate.variances`), and values are best linear unbiased predictions, as of a Kalman smoother
 with a diffuse start. On few points q and s^2 are hardly known. Hence they are not chosen but averaged over: on a grid,
 by their restricted likelihood times a prior density (1 + x)^-p of x, s or the random walk over the time that is
 covered, each in units of the median of u: below u all sizes are alike. With p = 5/3 intervals of simulated instruments
 hold as often as stated; with p = 1, as for charts, all orders of magnitude above u are alike, and where there are few
 calibrations intervals are too wide. Intervals are those of the mixture, wider where little is known.
 
-Sources: H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545; G. Robinson, Statistical Science 6 (1991) 15
+Sources: G. Robinson, Statistical Science 6 (1991) 15
 (prediction); J. O. Berger, V. De Oliveira, B. Sanso, J. Am. Stat. Assoc. 96 (2001) 1361 (why not to choose).
 """
 
@@ -29,6 +29,7 @@ from scipy.special import ndtr
 
 from inercal.arrays import Array
 from inercal.estimate.result import COVERAGE
+from inercal.estimate.variances import solved, weighed
 
 _GRID = 25
 """Sizes of each variance that are tried."""
@@ -135,20 +136,26 @@ def wandering(series: Series) -> Wandering:
     prior = np.log(prior_of(sizes / series.scale, _POWER))
     begun = series.t - series.t.min()
     walked = np.minimum.outer(begun, begun) / span
-    floor = (1e-6 * series.scale) ** 2 * np.eye(len(series.y))  # results without an uncertainty
+    # results without an uncertainty, or nearly all of it in common
+    floor = (1e-6 * np.hypot(series.scale, series.common.max())) ** 2 * np.eye(len(series.y))
     certain = np.diag(series.own**2) + np.outer(series.common, series.common) + floor
-    scatter = sizes[:, None, None] ** 2 * np.eye(len(series.y))
-    pieces = []
-    for w, of_walk in zip(sizes, prior, strict=True):
-        logs, *rest = _solved(certain + w**2 * walked + scatter, X, series)
-        pieces.append((logs + of_walk + prior, np.full(_GRID, w / np.sqrt(span)), sizes, *rest))
-    logs, walk, noise, trend, covariance, inverse = (
-        np.concatenate(each) for each in zip(*pieces, strict=True)
+    walk, noise = (size.ravel() for size in np.meshgrid(sizes, sizes, indexing="ij"))
+    V = certain + walk[:, None, None] ** 2 * walked + noise[:, None, None] ** 2 * np.eye(len(series.y))
+    whiten = np.linalg.inv(np.linalg.cholesky(V))
+    fit = solved(whiten @ np.column_stack([X, series.y]))
+    size = -2.0 * np.log(np.einsum("gii->gi", whiten)).sum(axis=1)
+    logs = fit.likelihood(size) + np.add.outer(prior, prior).ravel()
+    kept = weighed(logs) > _NEGLIGIBLE
+    whiten, of_trend = whiten[kept], fit.inverse[kept]
+    return Wandering(
+        series,
+        weighed(logs[kept]),
+        walk[kept] / np.sqrt(span),
+        noise[kept],
+        fit.x[kept],
+        of_trend @ np.swapaxes(of_trend, 1, 2),
+        np.swapaxes(whiten, 1, 2) @ whiten,
     )
-    weights = np.exp(logs - logs.max())
-    kept = weights > _NEGLIGIBLE * weights.sum()
-    weights = weights[kept] / weights[kept].sum()
-    return Wandering(series, weights, walk[kept], noise[kept], trend[kept], covariance[kept], inverse[kept])
 
 
 def _regressors(series: Series) -> Array:
@@ -161,25 +168,6 @@ def prior_of(x: Array, power: float) -> Array:
     edges = np.concatenate([[0.0, 0.5 * x[1]], np.sqrt(x[1:-1] * x[2:]), [x[-1] ** 1.5 / x[-2] ** 0.5]])
     weight: Array = np.diff(np.log1p(edges) if power == 1.0 else -((1.0 + edges) ** (1.0 - power)))
     return weight
-
-
-def _solved(V: Array, X: Array, series: Series) -> tuple[Array, Array, Array, Array]:
-    """Restricted log-likelihoods (g,), trends, their covariances, and the inverses of ``V`` (g, n, n)."""
-    inverse = _inverse(V)
-    of_X = inverse @ X
-    information = X.T @ of_X
-    covariance = _inverse(information)
-    trend: Array = (covariance @ (np.swapaxes(of_X, 1, 2) @ series.y)[..., None])[..., 0]
-    r = series.y - trend @ X.T
-    chi2 = np.einsum("gi,gij,gj->g", r, inverse, r)
-    logs: Array = -0.5 * (np.linalg.slogdet(V)[1] + np.linalg.slogdet(information)[1] + chi2)
-    return logs, trend, covariance, inverse
-
-
-def _inverse(matrices: Array) -> Array:
-    """Inverses (g, n, n)."""
-    inverse: Array = np.linalg.inv(matrices).astype(float, copy=False)
-    return inverse
 
 
 def _interval(weights: Array, means: Array, sigmas: Array) -> Interval:

@@ -15,7 +15,7 @@ from inercal.arrays import Array
 from inercal.errors import StudyError
 from inercal.geometry.rotations import exp, from_matrix, log, multiply
 from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.observability import singular
+from inercal.selfcal.before.observability import not_positive
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.problem import problem
 from inercal.selfcal.filters.run import estimate
@@ -73,7 +73,7 @@ def with_base(recording: Recording, settings: SelfcalSettings) -> SelfcalSetting
         return wide  # a recording that contradicts the model: the diagnosis says how
     near = replace(wide, base=base.turned(batch.coefficients[BETA]))
     bound = _bound(recording, near, batch)
-    if singular(prior[BETA], bound) is not None:
+    if not_positive(prior[BETA], bound) is not None:
         return near
     u = np.sqrt(np.diag(bound))
     if settings.heading_unknown:

@@ -29,9 +29,9 @@ from inercal.errors import StudyError
 from inercal.estimate.basis import studied
 from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.identifiability import UNSEEN
+from inercal.estimate.remarks import at_prior, exact_inputs, missed, reached
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
-from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted as so_many
 from inercal.records.record import Record
 from inercal.selfcal.before.bounds import PathBounds
@@ -243,28 +243,9 @@ def _assembled(
     for part, each in zip(parts, alone, strict=True):
         told = (f for f in each.estimate.findings if f.code not in _OF_ONE)
         findings += [replace(f, message=f"{part.name}: {f.message}") for f in told]
-    ratio = dict(zip(fit.names, judged.learned.ratio, strict=True))
-    findings += [
-        Finding("at_prior", f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left")
-        for name in judged.at_prior
-    ]
-    goal = {
-        name: {"wanted": settings.goal[name], "u": float(each), "met": bool(each <= settings.goal[name])}
-        for name, each in zip(fit.names, uncertainty.u, strict=True)
-        if name in settings.goal
-    }
-    for name, reached in goal.items():
-        if not reached["met"]:
-            unit, size = shown_unit(UNIT_OF[name])
-            text = (
-                f"{name}: u = {reached['u'] / size:.2g} {unit}, wanted {reached['wanted'] / size:.2g} {unit}"
-            )
-            findings.append(Finding("goal_missed", text))
-    if exact:
-        text = (
-            f"{', '.join(exact)}: an error as large as one u of a coefficient is {', '.join(exact.values())}"
-        )
-        findings.append(Finding("stated_exact", f"{text}; state them with uncertainties, or as states"))
+    goal = reached(fit.names, uncertainty.u, settings.goal)
+    findings += [*at_prior(judged.at_prior), *missed(goal, UNIT_OF)]
+    findings += exact_inputs(exact, cure="state them with uncertainties, or as states")
     basis = studied(
         COMMAND,
         settings,

@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.variances import second_moment, weighed
 from inercal.strapdown.batch import Fit
 from inercal.strapdown.limits import LIMITS
 from inercal.strapdown.restricted import Solved, separated, solved
@@ -53,10 +54,11 @@ def _second_moment(fit: Fit, others: Array, part: Array, found: float) -> Array:
         reach *= 0.75
     sizes = reach * (np.arange(count) + 0.5) / count
     tried = [_at(fit, others, part, size) for size in sizes.tolist()]
-    weight = np.exp(-0.5 * np.array([each.deviance - here.deviance for each in tried]))
-    off = np.array([each.step - here.step for each in tried])
-    spread = np.einsum("k,kab->ab", weight, [each.covariance for each in tried])
-    return np.asarray((spread + np.einsum("k,ka,kb->ab", weight, off, off)) / weight.sum())
+    return second_moment(
+        weighed(np.array([-0.5 * each.deviance for each in tried])),
+        np.array([each.covariance for each in tried]),
+        np.array([each.step - here.step for each in tried]),
+    )
 
 
 def _at(fit: Fit, others: Array, part: Array, size: float) -> Solved:

@@ -13,6 +13,7 @@ from inercal.arrays import Array, short_repr
 from inercal.designs.search import Designed
 from inercal.errors import StudyError
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN
+from inercal.estimate.remarks import at_prior_together
 from inercal.estimate.rounding import short
 from inercal.estimate.table import Table, heads
 from inercal.findings import Finding
@@ -244,19 +245,17 @@ def _at_prior(along: PlanBounds) -> list[str]:
 def _findings(along: PlanBounds) -> tuple[Finding, ...]:
     """``at_prior``, and in words where a calibration would end as unobservable."""
     at_prior = _at_prior(along)
-    if not at_prior:
-        return ()
     unseen = [
         name
         for name, left in zip(along.names, _left(along).tolist(), strict=True)
         if group_of(name) in ALWAYS and left > UNSEEN
     ]
-    text = f"{counted_names(at_prior, 6)}: more than half of the prior is left"
-    if unseen:
-        text += (
-            f"; the turns say nothing about {counted_names(unseen, 6)}: a calibration would be unobservable"
-        )
-    return (Finding("at_prior", text),)
+    more = (
+        f"; the turns say nothing about {counted_names(unseen, 6)}: a calibration would be unobservable"
+        if unseen
+        else ""
+    )
+    return tuple(at_prior_together(at_prior, more))
 
 
 def _told(along: PlanBounds) -> list[list[tuple[str, float]]]:

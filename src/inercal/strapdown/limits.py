@@ -90,12 +90,6 @@ class Limits:
     last_step: float = 0.2
     """Largest step, over the standard uncertainties, of the last of all, at which the fit still counts."""
 
-    scoring: int = 60
-    """Steps at most to the noise that a record shows, of one linear problem."""
-
-    scoring_gain: float = 1e-3
-    """Fall of -2 ln L in a step, below which they end."""
-
     noise_rounds: int = 6
     """Fits at most while noise is estimated."""
 

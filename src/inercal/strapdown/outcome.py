@@ -14,6 +14,7 @@ from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeB, combine
 from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.estimate.remarks import at_prior_together, exact_gravity, singular
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.geometry.rotations import conjugate, log, multiply
@@ -99,16 +100,8 @@ def assemble(
     left = dict(zip(found, (uncertainty.u / prior_u).tolist(), strict=True))
     judged = learned(J @ fit.covariance @ J.T, prior_u, found)
     at_prior = [name for name in found if left[name] > HALF_SEEN]
-    findings = [*record.findings]
-    if at_prior:
-        text = f"{counted_names(at_prior, 6)}: more than half of the prior is left"
-        findings.append(Finding("at_prior", text))
-    if not settings.site.inputs:
-        text = (
-            f"gravity is taken as exactly {settings.site.gravity:.7g} m/s^2, and its relative error goes into all K1: "
-            'state it with its uncertainty, such as gravity = "9.79649(2) m/s^2"'
-        )
-        findings.append(Finding("stated_exact", text))
+    findings = [*record.findings, *at_prior_together(at_prior)]
+    findings += exact_gravity(settings.site, "its relative error goes into all K1")
     findings += _too_quiet(fit)
     findings += _left_out(tested, found, J, fitted_u)
     findings += [each for ramp in ramps if (each := _shown(ramp, found, J, fitted_u)).harm]
@@ -185,10 +178,7 @@ def failed(
 ) -> Estimate:
     """The estimate where the filter runs off."""
     text = 'the error-state filter ran off: take the batch (filter = "batch"), which holds where biases walk'
-    result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
-    return Estimate.without(
-        _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
-    )
+    return _without(record, samples, rests, settings, Status.NOT_CONVERGED, text)
 
 
 def useless(
@@ -199,10 +189,7 @@ def useless(
         f"no solution was found; at rest the accelerometers read {force:.3g} m/s^2, expected about "
         f"{settings.site.gravity:.3g}: check units, signs and the order of axes"
     )
-    result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
-    return Estimate.without(
-        _basis(record, settings), Status.NOT_CONVERGED, text, findings=record.findings, result=result
-    )
+    return _without(record, samples, rests, settings, Status.NOT_CONVERGED, text)
 
 
 def too_few(
@@ -213,9 +200,21 @@ def too_few(
         f"found {counted(len(rests), 'rest')} of {LIMITS.shortest_rest:g} s or more, expected {LIMITS.fewest_rests} or "
         "more: let the unit stand still between the turns, or list the rests (rests.list)"
     )
+    return _without(record, samples, rests, settings, Status.TOO_FEW_INTERVALS, text)
+
+
+def _without(
+    record: Record,
+    samples: Samples,
+    rests: tuple[Dwell, ...],
+    settings: StrapdownSettings,
+    status: Status,
+    message: str,
+) -> Estimate:
+    """The estimate of a recording without coefficients, and why there are none."""
     result = {"estimator": settings.filter, "rests": _times(rests, samples), "turns": []}
     return Estimate.without(
-        _basis(record, settings), Status.TOO_FEW_INTERVALS, text, findings=record.findings, result=result
+        _basis(record, settings), status, message, findings=record.findings, result=result
     )
 
 
@@ -381,11 +380,8 @@ def _verdict(
             f"the turns say nothing about {counted_names(unseen, 6)}; the weakest combination is "
             f"{judged.weakest()[0]}: add turns about other axes, and at least two quadrants of each"
         )
-    if judged.left[-1] ** 2 < len(judged.left) * np.finfo(float).eps * judged.left[0] ** 2:
-        return Status.ILL_CONDITIONED, (
-            f"the covariance is numerically singular: {judged.weakest()[0]} is known too weakly beside the rest; add "
-            "turns about other axes"
-        )
+    if weak := singular(judged, "add turns about other axes"):
+        return weak
     return Status.OK, (
         f"{counted(len(left), 'coefficient')} from {counted(int(statistics['intervals']), 'rest')}, chi-square "
         f"{fit.chi2:.4g} with {fit.dof:.0f} degrees of freedom"

@@ -1,7 +1,7 @@
 """Noise that a recording shows: turns that do not close as well as white noise says, and walks of biases.
 
-Variances by restricted likelihood (Patterson and Thompson, Biometrika 58 (1971) 545): of the linear problem at the last
-pass of a fit, with all unknowns integrated out,
+Variances by restricted likelihood (`inercal.estimate.variances`): of the linear problem at the last pass of a fit, with
+all unknowns integrated out,
 
     -2 ln L = sum ln |Q_k| + ln |H| + chi-square        Q_k = Q_k of the sensors + sum s_j Q_kj
 
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from inercal.arrays import Array
+from inercal.estimate.variances import Highest, Score, highest
 from inercal.strapdown.arrow import Chain, backward, forward
 from inercal.strapdown.batch import (
     Fit,
@@ -90,35 +91,22 @@ def separated(
     return of_others, np.stack(parts), variances[places]
 
 
-def _scored(fit: Fit, fixed: Array, parts: Array, s: Array, least: Array) -> tuple[Array, float, float]:
+def _scored(fit: Fit, fixed: Array, parts: Array, s: Array, least: Array) -> Highest:
     """Variances of largest likelihood, from ``s`` (q,) on and not below ``least`` (q,), of the ``parts`` (q, k, m, m)
-    of the covariance beside what is ``fixed`` (k, m, m), the deviance there, and by how much it fell."""
-    first = deviance = np.inf
-    kept, part = s, 1.0
-    for _ in range(LIMITS.scoring):
+    of the covariance beside what is ``fixed`` (k, m, m)."""
+
+    def score(s: Array) -> Score:
         W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", s, parts)))
-        now = solved(fit.chain._replace(W=W), fit.prior)
-        if now.deviance > deviance + 1e-6:  # the step was too long, and so will be the next
-            part *= 0.5
-            s = np.sqrt(kept * s)
-            if part < 1e-3:
-                break
-            continue
-        gain, deviance, kept, part = deviance - now.deviance, now.deviance, s, min(2.0 * part, 1.0)
-        first = deviance if first == np.inf else first
-        if gain < LIMITS.scoring_gain:
-            break
-        M = W - W @ followed_by(fit.chain._replace(W=W), now.rows, now.covariance).out @ W
+        chain = fit.chain._replace(W=W)
+        now = solved(chain, fit.prior)
+        M = W - W @ followed_by(chain, now.rows, now.covariance).out @ W
         weighted = np.einsum("kab,kb->ka", W, now.left)
         of_data = np.einsum("ka,qkab,kb->q", weighted, parts, weighted)
         through = np.einsum("kab,qkbc->qkac", M, parts)
         slope = 0.5 * (of_data - np.einsum("qkaa->q", through))
-        curvature = 0.5 * np.einsum("pkab,qkba->pq", through, through)
-        step = part * np.linalg.lstsq(curvature, slope, rcond=1e-10)[0]
-        s = np.clip(np.maximum(s + step, 0.1 * s), least, 30.0 * s)
-        if 2.0 * slope @ (s - kept) < LIMITS.scoring_gain:
-            break
-    return kept, float(deviance), float(first - deviance)
+        return Score(-0.5 * now.deviance, slope, 0.5 * np.einsum("pkab,qkba->pq", through, through))
+
+    return highest(score, s, least)
 
 
 class Found(NamedTuple):
@@ -164,7 +152,7 @@ def _iterated(
     samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit, names: tuple[str, ...]
 ) -> Found | None:
     """The noise, of fits and linear problems in turns; raises `numpy.linalg.LinAlgError` where a matrix is singular."""
-    noise, deviance = _started(settings.noise, names, LIMITS.walk_start), 0.0
+    noise = _started(settings.noise, names, LIMITS.walk_start)
     least = LIMITS.least_noise**2 * variances_of(noise)[[_PLACES[name] for name in names]]
     for left in reversed(range(LIMITS.noise_rounds)):
         now = replace(settings, noise=noise)
@@ -173,12 +161,13 @@ def _iterated(
             return None
         fitted = again
         fixed, parts, s = separated(fitted, samples, now, names)
-        found, deviance, gained = _scored(fitted, fixed, parts, s, least)
-        if not left or gained < LIMITS.noise_gain:
+        found = _scored(fitted, fixed, parts, s, least)
+        if not left or 2.0 * found.gain < LIMITS.noise_gain:
             break
-        noise = _changed(noise, dict(zip(names, np.sqrt(found).tolist(), strict=True)))
+        noise = _changed(noise, dict(zip(names, np.sqrt(found.variances).tolist(), strict=True)))
     W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", least, parts)))
-    return Found(noise, solved(fitted.chain._replace(W=W), fitted.prior).deviance - deviance, fitted)
+    without = solved(fitted.chain._replace(W=W), fitted.prior).deviance
+    return Found(noise, without + 2.0 * found.score.value, fitted)
 
 
 class Shown(NamedTuple):

@@ -117,7 +117,7 @@ def fit(recording: Recording, settings: AoaSettings) -> Verified:
             break
     more = learned(covariance, wide, names)
     noise = np.sqrt(power / OVERLAP[0] * truth.span) * np.where(count > 0, 1.0, np.nan)
-    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    unseen = tuple(more.at_prior(1.0 / LIMITS.widened_prior))
     return Verified(names, units, x, covariance, more, unseen, noise, truth.noise, len(truth.rows), converged)
 
 

@@ -6,8 +6,8 @@ The means of the readings at K rests are fitted, of each accelerometer its scale
 
 The error of a reading of the reference is one and the same for all rows of a rest and for all sensors: it enters the
 covariance of the readings of a rest as sigma^2 s s^T, s their slopes by the angle, beside their own means' scatter.
-sigma is that of the largest restricted likelihood (Patterson and Thompson 1971, Biometrika 58), and where chi-square
-is still above its degrees of freedom the covariance grows with it. What rests do not show stays at ten times the
+sigma is that of the largest restricted likelihood (`inercal.estimate.variances`), and where chi-square is still above
+its degrees of freedom the covariance grows with it. What rests do not show stays at ten times the
 study's prior, as in `inercal.aoa.reference.sensor_fit`; the zero of the reference is taken as true.
 """
 
@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
 from inercal.errors import RecordError
 from inercal.estimate.identifiability import learned
+from inercal.estimate.variances import Solved, solved
 
 Stretch = tuple[int, int]
 
@@ -75,22 +75,24 @@ def static_fit(recording: Recording, settings: AoaSettings, points: Sequence[Str
     pooled = np.sqrt(np.nanmean(np.square(u), axis=0))
     x = start.copy()
 
-    def solved(sigma: float) -> _Solved:
-        return _solve(sigma, x - start, _linear(settings, theta, means, x), pooled, wide)
-
     for _ in range(_ITERATIONS):
-        sigma = max(_SIGMAS, key=lambda each: solved(each).likelihood)
-        found = solved(sigma)
-        x = start + found.x
+        linear = _linear(settings, theta, means, x)
+        tried = [_solve(sigma, x - start, linear, pooled, wide) for sigma in _SIGMAS]
+        best = int(np.argmax([likelihood for _, likelihood in tried]))
+        sigma, found = _SIGMAS[best], tried[best][0]
+        x = start + wide * found.x
     if sigma >= _SIGMAS[-1]:
         raise RecordError("theta_ref", "found angles that no sensor follows, expected those of the model")
-    P = found.P * max(found.chi2 / found.dof, 1.0)
+    inverse = found.inverse
+    used = len(wide) - float(np.sum(inverse**2))
+    dof = max(np.count_nonzero(np.isfinite(means)) - used, 1.0)
+    P = inverse @ inverse.T * np.outer(wide, wide) * max(float(found.chi2) / dof, 1.0)
     at = names.index("b_g")
     good = rates[np.isfinite(rates)]
     if len(good) > 1:
         x[at], P[at, at] = float(good.mean()), float(good.var(ddof=1)) / len(good)
     more = learned(P, wide, names)
-    unseen = more.at_prior(1.0 / LIMITS.widened_prior)
+    unseen = tuple(more.at_prior(1.0 / LIMITS.widened_prior))
     rows = int(np.isfinite(recording.reference).sum())
     return Verified(names, units, x, P, more, unseen, np.full(n + 1, np.nan), sigma, rows, True)
 
@@ -120,21 +122,13 @@ def _rests(recording: Recording, points: Sequence[Stretch]) -> tuple[Array, Arra
     return np.array(theta), np.reshape(means, shape), np.reshape(u, shape), np.array(rates)
 
 
-class _Solved(NamedTuple):
-    """Coefficients less their first values ``x`` (p,), covariance ``P`` (p, p), ``chi2`` with its degrees of freedom
-    ``dof``, and the logarithm of the restricted ``likelihood``, but for a constant."""
-
-    x: Array
-    P: Array
-    chi2: float
-    dof: float
-    likelihood: float
-
-
-def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array, wide: Array) -> _Solved:
-    """One step of weighted least squares about ``x``, with readings of the reference off by ``sigma`` [rad]."""
+def _solve(
+    sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array, wide: Array
+) -> tuple[Solved, float]:
+    """One step of weighted least squares about ``x``, with readings of the reference off by ``sigma`` [rad]; the
+    logarithm of its restricted likelihood."""
     jacobian, residual, slopes = linear
-    rows, rights, determinant = [np.eye(len(wide))], [np.zeros(len(wide))], 0.0
+    rows, determinant = [np.eye(len(wide), len(wide) + 1)], 0.0
     for J, r, s in zip(jacobian, residual + jacobian @ x, slopes, strict=True):
         seen = np.isfinite(r) & np.isfinite(u)
         weighted = np.column_stack([J[seen] * wide, r[seen]]) / u[seen, None]
@@ -143,20 +137,10 @@ def _solve(sigma: float, x: Array, linear: tuple[Array, Array, Array], u: Array,
         common = math.hypot(1.0, sigma * length)
         # rows by C^(-1/2), C = diag(u^2) + sigma^2 s s^T: products of C^-1 would cancel where sigma is far above u
         weighted -= (1.0 - 1.0 / common) * np.outer(along / length, along @ weighted / length)
-        rows.append(weighted[:, :-1])
-        rights.append(weighted[:, -1])
+        rows.append(weighted)
         determinant += 2.0 * float(np.log(u[seen]).sum() + np.log(common))
-    left, right = np.concatenate(rows), np.concatenate(rights)
-    Q, R = np.linalg.qr(left)
-    inverse = np.linalg.inv(R)
-    solution = inverse @ (Q.T @ right)
-    misfit = right - left @ solution
-    chi2 = float(misfit @ misfit)
-    used = len(wide) - float(np.sum(inverse**2))
-    likelihood = -0.5 * (determinant + 2.0 * float(np.log(np.abs(np.diag(R))).sum()) + chi2)
-    count = len(right) - len(wide)
-    P = inverse @ inverse.T * np.outer(wide, wide)
-    return _Solved(wide * solution, P, chi2, max(count - used, 1.0), likelihood)
+    found = solved(np.concatenate(rows))
+    return found, float(found.likelihood(determinant))
 
 
 def _linear(settings: AoaSettings, theta: Array, means: Array, x: Array) -> tuple[Array, Array, Array]:

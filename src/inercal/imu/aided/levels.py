@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.arrays import Array
+from inercal.estimate.variances import Solved, degrees, weighed
 from inercal.imu.aided.walk import whiten
 from inercal.imu.limits import LIMITS
 
@@ -133,23 +134,17 @@ def chosen(triad: Sequence[tuple[Levels, Levels]]) -> list[Levels]:
 
 def _mean(grid: Array, likelihood: Array) -> tuple[float, float]:
     """Mean of K over its likelihood (log, on the grid), and the degrees of freedom by its spread."""
-    weight = np.exp(likelihood - likelihood.max()) * np.gradient(grid)
-    weight /= weight.sum()
+    weight = weighed(likelihood + np.log(np.gradient(grid)))
     mean = float(weight @ grid)
-    spread = float(weight @ (grid - mean) ** 2)
-    return mean, max(0.5 * mean**2 / spread, 1.0) if spread > 0.0 else np.inf
+    spread = 4.0 * float(weight @ (grid - mean) ** 2) / mean**2  # of the logarithm of its square
+    return mean, float(degrees(spread)) if spread > 0.0 else np.inf
 
 
 def _restricted(columns: Array, prior: Array, t: Array, white: Array, walk: Array) -> float:
-    """Log of the restricted likelihood (Patterson and Thompson 1971) of one walk; the residual is the last column."""
+    """Log of the restricted likelihood of one walk; the residual is the last column."""
     done = whiten(columns, t, white, walk)
-    gram = done.rows.T @ done.rows
-    right = gram[:-1, -1] + prior
-    own = gram[:-1, :-1] + np.eye(len(prior))
-    length = np.sqrt(np.diag(own))
-    factor = np.linalg.cholesky(own / np.outer(length, length) + 1e-12 * np.eye(len(prior)))
-    projected = np.linalg.solve(factor, right / length)
-    volume = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(length).sum()
-    return -0.5 * float(
-        np.log(done.size[1:]).sum() + volume + gram[-1, -1] + prior @ prior - projected @ projected
-    )
+    rows = np.vstack([done.rows, np.column_stack([np.eye(len(prior)), prior])])
+    gram = rows.T @ rows
+    length = np.sqrt(np.diag(gram))
+    root = np.linalg.cholesky(gram / np.outer(length, length) + 1e-12 * np.eye(len(length))).T * length
+    return float(Solved(root).likelihood(np.log(done.size[1:]).sum()))

@@ -14,6 +14,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.least_squares import least_squares
+from inercal.estimate.variances import degrees, solved, weighed
 
 PARTS = 64
 """Equal parts of a sweep whose means are taken."""
@@ -135,25 +136,20 @@ def _wander(A: Array, means: Array) -> tuple[float, Array, Array]:
     n, p = A.shape
     gain = np.linalg.pinv(A)
     steps = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
-    likelihood, covariances = [], []
-    for rho in _CORRELATIONS:
-        # independent innovations: the first mean, then each less rho times the one before
-        root = np.sqrt(1.0 - rho**2)
-        whiten = np.eye(n) - rho * np.eye(n, k=-1)
-        whiten[0, 0] = root
-        q, r = np.linalg.qr(whiten @ A)
-        y = whiten @ means
-        left = y - q @ (q.T @ y)
-        s2 = max(float(left @ left) / (n - p), 1e-300)
-        log_det = 2.0 * (float(np.sum(np.log(np.abs(np.diag(r))))) - np.log(root))
-        likelihood.append(-0.5 * ((n - p) * np.log(s2) + log_det))
-        covariances.append(s2 / root**2 * gain @ rho**steps @ gain.T)
-    weights = np.exp(np.array(likelihood) - np.max(likelihood))
-    weights /= weights.sum()
-    logs = np.log([np.diag(covariance) for covariance in covariances])
+    # independent innovations: the first mean, then each less rho times the one before
+    rho = _CORRELATIONS[:, None, None]
+    root = np.sqrt(1.0 - _CORRELATIONS**2)
+    whiten = np.eye(n) - rho * np.eye(n, k=-1)
+    whiten[:, 0, 0] = root
+    fit = solved(whiten @ np.column_stack([A, means]))
+    s2 = np.maximum(fit.chi2 / (n - p), 1e-300)
+    likelihood = -0.5 * ((n - p) * np.log(s2) + fit.volume - 2.0 * np.log(root))
+    covariances = (s2 / root**2)[:, None, None] * (gain @ rho**steps @ gain.T)
+    weights = weighed(likelihood)
+    logs = np.log(np.einsum("kii->ki", covariances))
     typical = weights @ logs
     spread = weights @ (logs - typical) ** 2 + 2.0 / (n - p)
     mean = np.einsum("k,kij->ij", weights, covariances)
     scale = np.exp(0.5 * (typical - np.log(np.diag(mean))))
     best = float(_CORRELATIONS[np.argmax(likelihood)])
-    return best, mean * np.outer(scale, scale), np.maximum(2.0 / spread, 1.0)
+    return best, mean * np.outer(scale, scale), degrees(spread)

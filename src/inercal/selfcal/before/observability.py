@@ -8,21 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.estimate.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.estimate.identifiability import UNSEEN, Learned, learned
+from inercal.estimate.remarks import Goal, at_prior, missed, reached
 from inercal.estimate.rounding import rounded
 from inercal.findings import Finding, Status
 from inercal.selfcal.before.bounds import PathBounds
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.platform.coefficients import shown_units
+from inercal.selfcal.platform.states import UNIT_OF
 
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """A path judged by its bounds, as ``learned`` against the prior; ``to_goal`` u over the wanted u, by name."""
+    """A path judged by its bounds, as ``learned`` against the prior and by each ``goal``."""
 
     bounds: PathBounds
     learned: Learned
-    to_goal: Mapping[str, float]
+    goal: Mapping[str, Goal]
+
+    @property
+    def to_goal(self) -> Mapping[str, float]:
+        """u over the wanted u, by name."""
+        return {name: goal["u"] / goal["wanted"] for name, goal in self.goal.items()}
 
     @property
     def rank(self) -> int:
@@ -30,31 +37,15 @@ class Observability:
         return int(np.sum(self.learned.left <= UNSEEN))
 
     @property
-    def at_prior(self) -> tuple[str, ...]:
-        """Names of the coefficients that the path leaves at their prior."""
-        return self.learned.at_prior(HALF_SEEN)
-
-    @property
-    def unmet(self) -> tuple[str, ...]:
-        """Names of the coefficients whose goal the path does not reach."""
-        return tuple(name for name, ratio in self.to_goal.items() if ratio > 1.0)
+    def at_prior(self) -> Mapping[str, float]:
+        """Coefficients that the path leaves at their prior, and the part of it that is left."""
+        return self.learned.at_prior()
 
     def findings(self) -> tuple[Finding, ...]:
         """A finding for each coefficient at its prior, or wider than wanted."""
-        ratio = dict(zip(self.bounds.names, self.learned.ratio, strict=True))
-        u = {name: f"{size} {unit}" for name, size, unit in self._shown()}
-        left = {
-            name: f"{name}: the path leaves {100 * ratio[name]:.0f} % of its prior, u = {u[name]}"
-            for name in self.at_prior
-        }
-        wide = {
-            name: f"{name}: the path leaves u = {u[name]}, {self.to_goal[name]:.3g} times the goal"
-            for name in self.unmet
-        }
-        return (
-            *(Finding("at_prior", text) for text in left.values()),
-            *(Finding("goal_missed", text) for name, text in wide.items() if name not in left),
-        )
+        hints = {name: f"u = {size} {unit}" for name, size, unit in self._shown()}
+        wide = {name: goal for name, goal in self.goal.items() if name not in self.at_prior}
+        return (*at_prior(self.at_prior, hints), *missed(wide, UNIT_OF))
 
     def worst(self, count: int = 3) -> list[str]:
         """The worst-known combinations in words, with the share of its prior that is left of each."""
@@ -78,10 +69,8 @@ class Observability:
 
 def observability(bounds: PathBounds, goal: Mapping[str, float]) -> Observability:
     """Judge a path; ``goal`` wanted standard uncertainty [SI] by name of coefficient."""
-    to_goal = {
-        name: float(u / goal[name]) for name, u in zip(bounds.names, bounds.u, strict=True) if name in goal
-    }
-    return Observability(bounds, learned(bounds.covariance, bounds.prior, bounds.names), to_goal)
+    goals = reached(bounds.names, bounds.u, goal)
+    return Observability(bounds, learned(bounds.covariance, bounds.prior, bounds.names), goals)
 
 
 def useless(filtered: FilterResult, bounds: PathBounds, by_filter: Array) -> tuple[Status, str] | None:
@@ -93,10 +82,10 @@ def useless(filtered: FilterResult, bounds: PathBounds, by_filter: Array) -> tup
         return Status.UNOBSERVABLE, (
             "no row after the first has a measurement that is used: all are missing, or stopped by near-level gating"
         )
-    return singular(bounds.prior, by_filter, bounds.covariance)
+    return not_positive(bounds.prior, by_filter, bounds.covariance)
 
 
-def singular(prior: Array, *covariances: Array) -> tuple[Status, str] | None:
+def not_positive(prior: Array, *covariances: Array) -> tuple[Status, str] | None:
     """Status and sentence where a covariance (p, p) over the ``prior`` (p,) is not positive within rounding."""
     scale = np.outer(prior, prior)
     if all(_positive(P / scale) for P in covariances):

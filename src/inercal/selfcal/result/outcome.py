@@ -15,12 +15,12 @@ from inercal.estimate.budget import BudgetItem, combine
 from inercal.estimate.consistency import Nis, nis
 from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import HALF_SEEN, UNSEEN
+from inercal.estimate.remarks import at_prior, exact_inputs, missed, reached, singular
 from inercal.estimate.result import Estimate
 from inercal.findings import CODES, EVERYTHING, Finding, Status, causes
-from inercal.instruments.terms import shown_unit
 from inercal.records.places import counted
 from inercal.selfcal.before.bounds import PathBounds
-from inercal.selfcal.before.observability import Observability, observability, singular, useless
+from inercal.selfcal.before.observability import Observability, not_positive, observability, useless
 from inercal.selfcal.diagnosis.fit_quality import filtered as judging
 from inercal.selfcal.diagnosis.small import likely
 from inercal.selfcal.estimators import ESTIMATORS, FACTOR_OF
@@ -121,42 +121,31 @@ def assemble(
     if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
         text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
         return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
-    if (unusable := singular(bounds.prior, uncertainty.covariance)) is not None:
+    if (unusable := not_positive(bounds.prior, uncertainty.covariance)) is not None:
         return Estimate.without(basis, *unusable, findings=all_findings, result=result)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
     more = np.square(np.diag(uncertainty.covariance) / np.diag(by_filter))
     effective = max(dof, 1.0) * np.where(np.abs(more - 1.0) < 1e-6, 1.0, more)
-    u, goal = uncertainty.u, settings.goal
+    u = uncertainty.u
 
     judged = observability(replace(bounds, covariance=by_filter), settings.goal)
     agreement = nis(filtered.nis, filtered.dims)
     hidden = _hidden(judged, u / bounds.prior, uncertainty.budget)
     result["at_prior"] = [name for name in filtered.names if name in {*judged.at_prior, *hidden}]
-    result["goal"] = {
-        name: {"wanted": goal[name], "u": float(each), "met": bool(each <= goal[name])}
-        for name, each in zip(filtered.names, u, strict=True)
-        if name in goal
-    }
+    result["goal"] = reached(filtered.names, u, settings.goal)
     hints = _hardly_turned(recording, settings)
-    all_findings += _left_at_prior(judged, hints)
+    # of biases that walk no recording tells more
+    left = {name: part for name, part in judged.at_prior.items() if KIND_OF[name] not in BIAS_WALK}
+    all_findings += at_prior(left, hints)
     limit = _limit(agreement, recording, settings)
     status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
     # numbers that must not be used need no more findings
     if status is not Status.INCONSISTENT:
-        all_findings += _missed(result["goal"], hints)
+        all_findings += missed(result["goal"], UNIT_OF, hints)
         all_findings += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
-        if exact:
-            text = (
-                f"{', '.join(exact)} taken as exact: an error as large as one u of a coefficient comes from "
-                f"{', '.join(exact.values())}; state them with uncertainties"
-            )
-            all_findings.append(Finding("stated_exact", text))
-        if left_out:
-            text = (
-                f"{', '.join(left_out)} are no states: an error of the rig as large as one u of a coefficient is "
-                f"{', '.join(left_out.values())}; name them in states under [model], or state them with uncertainties"
-            )
-            all_findings.append(Finding("stated_exact", text))
+        all_findings += exact_inputs(exact)
+        cure = "name them in states under [model], or state them with uncertainties"
+        all_findings += exact_inputs(left_out, "are no states", cure)
         if rest is not None and rest.finding is not None:
             all_findings.append(rest.finding)
     lost = {name: why for name, (ratio, why) in hidden.items() if ratio > UNSEEN and name in NAMES}
@@ -246,15 +235,10 @@ def _verdict(
             f"the path says nothing about {', '.join(unseen)}: {100 * float(ratio.max()):.0f} % of the prior is left; "
             f"the weakest combination is {judged.learned.weakest()[0]}; {help}"
         )
-    left = judged.learned.left
-    if left[-1] ** 2 < len(left) * np.finfo(float).eps * left[0] ** 2:
-        return Status.ILL_CONDITIONED, (
-            f"the covariance is numerically singular: {judged.learned.weakest()[0]} is known too weakly beside the "
-            "rest; add turns about other axes"
-        )
-    return Status.OK, (
-        f"{counted(len(left), 'coefficient')} from {counted(agreement.rows, 'row')}, mean NIS {agreement.mean:.3g}"
-    )
+    if weak := singular(judged.learned, "add turns about other axes"):
+        return weak
+    many = counted(len(judged.learned.left), "coefficient")
+    return Status.OK, f"{many} from {counted(agreement.rows, 'row')}, mean NIS {agreement.mean:.3g}"
 
 
 def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str, str]:
@@ -271,33 +255,6 @@ def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str,
             )
             words |= dict.fromkeys(coefficients, text)
     return words
-
-
-def _left_at_prior(judged: Observability, hints: Mapping[str, str]) -> list[Finding]:
-    """Coefficients of which more than half of the prior is left."""
-    ratio = dict(zip(judged.learned.names, judged.learned.ratio, strict=True))
-    texts = {
-        name: f"{name}: {100.0 * ratio[name]:.0f} % of its prior is left"
-        for name in judged.at_prior
-        if KIND_OF[name] not in BIAS_WALK  # no recording tells more of them
-    }
-    return _hinted("at_prior", texts, hints)
-
-
-def _missed(goal: Mapping[str, Mapping[str, Any]], hints: Mapping[str, str]) -> list[Finding]:
-    """Goals that were not met."""
-    texts = {}
-    for name, unit in UNIT_OF.items():
-        if name in goal and not goal[name]["met"]:
-            shown, size = shown_unit(unit)
-            u, wanted = goal[name]["u"] / size, goal[name]["wanted"] / size
-            texts[name] = f"{name}: u = {u:.2g} {shown}, wanted {wanted:.2g} {shown}"
-    return _hinted("goal_missed", texts, hints)
-
-
-def _hinted(code: str, texts: Mapping[str, str], hints: Mapping[str, str]) -> list[Finding]:
-    """A finding for each coefficient, with the hint to it, if any."""
-    return [Finding(code, f"{text}; {hints[k]}" if k in hints else text) for k, text in texts.items()]
 
 
 def _hidden(

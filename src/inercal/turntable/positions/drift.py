@@ -17,6 +17,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeA
+from inercal.estimate.variances import degrees
 from inercal.findings import Finding
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.positions.faults import fraction
@@ -128,8 +129,6 @@ def _random(fit: Regression, count: int) -> tuple[Array, Array]:
 
 def _exponential(means: Readings, fit: Fit, unit: str) -> Drift:
     """An amplitude for each channel, and one time constant."""
-    from scipy.optimize import minimize_scalar
-
     n, channels = means.y.shape
     s = fraction(means.times)
     none = np.zeros((n, channels, 0))
@@ -138,10 +137,7 @@ def _exponential(means: Readings, fit: Fit, unit: str) -> Drift:
         done = fit(means.y, Effects(_own(means, np.exp(-s / np.exp(log_tau))), none))
         return float(np.sum(np.log(np.square(done.residuals).sum(axis=0))))
 
-    grid = np.linspace(np.log(_SHORTEST), np.log(_LONGEST), 12)
-    best = int(np.argmin([misfit(each) for each in grid]))
-    ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    tau = float(np.exp(minimize_scalar(misfit, bounds=ends, method="bounded", options={"xatol": 1e-3}).x))
+    tau = float(np.exp(_lowest(misfit, np.linspace(np.log(_SHORTEST), np.log(_LONGEST), 12), 1e-3)))
     decay = np.exp(-s / tau)
     done = fit(means.y, Effects(_own(means, decay), none))
     # change of the readings by the logarithm of the time constant, which may be off by a factor e
@@ -170,14 +166,14 @@ def _walk(means: Readings, fit: Fit, unit: str) -> Drift:
     walks = np.concatenate([_one(basis, k, channels) for k in range(channels)], axis=-1)
     none = np.zeros((n, channels, 0))
 
-    def likelihood(log: float) -> float:
-        return fit(means.y, Effects(none, walks * np.exp(log))).likelihood
+    def unlikely(log: float) -> float:
+        return -fit(means.y, Effects(none, walks * np.exp(log))).likelihood
 
-    start = fit(means.y, Effects(none, none))
-    log = _highest(likelihood, float(np.log(max(start.noise.max(), 1e-300))))
-    low, mid, high = (likelihood(log + step) for step in (-_STEP, 0.0, _STEP))
-    # the variance of the logarithm of a variance is two over its degrees of freedom
-    dof, size = max(1.0, 0.5 * (2.0 * mid - low - high) / _STEP**2), float(np.exp(log))
+    start = np.log(max(fit(means.y, Effects(none, none)).noise.max(), 1e-300))
+    log = _lowest(unlikely, start + np.linspace(-3.0, 6.0, 6), 0.1)
+    low, mid, high = (unlikely(log + step) for step in (-_STEP, 0.0, _STEP))
+    curvature = max(low - 2.0 * mid + high, 0.0) / (2.0 * _STEP) ** 2  # by the logarithm of a variance
+    dof, size = float(degrees(1.0 / max(curvature, 1e-300))), float(np.exp(log))
     done = fit(means.y, Effects(none, walks * size))
     many = walks.shape[-1]
     nuisance = ("bias_walk", size, size / np.sqrt(2.0 * dof), unit)
@@ -191,13 +187,10 @@ def _one(columns: Array, channel: int, channels: int) -> Array:
     return made
 
 
-def _highest(likelihood: Callable[[float], float], start: float) -> float:
-    """The logarithm at which a likelihood is highest, within a factor of 1000 about the start."""
+def _lowest(function: Callable[[float], float], grid: Array, tolerance: float) -> float:
+    """Place at which a function is lowest: the lowest point of a grid, then a search about it."""
     from scipy.optimize import minimize_scalar
 
-    grid = start + np.linspace(-3.0, 6.0, 6)
-    best = int(np.argmax([likelihood(each) for each in grid]))
+    best = int(np.argmin([function(x) for x in grid]))
     ends = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    return float(
-        minimize_scalar(lambda x: -likelihood(x), bounds=ends, method="bounded", options={"xatol": 0.1}).x
-    )
+    return float(minimize_scalar(function, bounds=ends, method="bounded", options={"xatol": tolerance}).x)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from inercal.arrays import Array
 from inercal.designs.comparison import in_basis
 from inercal.estimate.basis import conditions_of, studied
-from inercal.estimate.budget import BudgetItem, TypeA, TypeB, combine
+from inercal.estimate.budget import TypeA, TypeB, combine
 from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import WORST_BY_LENGTH
+from inercal.estimate.remarks import ruled_by_site
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding, Status
 from inercal.instruments.terms import TERMS
@@ -160,7 +161,8 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         findings += stated_exact(fit, settings.site, scale)
         findings += findings_of(examination, fit, scale, readings.unit)
         uncertainty = combine(names, [*stated, *doubts(examination, fit, scale)])
-    findings += of_site(names, uncertainty.budget, [each.source for each in fit.model.references])
+    of_site = [each.source for each in fit.model.references]
+    findings += ruled_by_site(names, uncertainty.budget, of_site, LIMITS.site_ratio)
     return Estimate.of(
         basis,
         names,
@@ -237,21 +239,6 @@ def _too_large(fit: Regression) -> list[Finding]:
         "than the noise: the uncertainties hold for smaller errors"
     )
     return [Finding("large_errors", text)]
-
-
-def of_site(names: Sequence[str], budget: Sequence[BudgetItem], sources: Collection[str]) -> list[Finding]:
-    """A finding where the ``sources`` of the site dominate u of terms ``names``."""
-    site = [item for item in budget if item.source in sources]
-    most = 1.0 - 1.0 / LIMITS.site_ratio**2  # of a variance
-    ruled = [name for name in names if sum(item.share.get(name, 0.0) for item in site) > most]
-    if not ruled:
-        return []
-    acting = [item.source for item in site if any(item.share.get(name) for name in ruled)]
-    text = (
-        f"u of {', '.join(ruled)} is mostly of what [site] states ({', '.join(acting)}): with an exact site it would "
-        "be less than half"
-    )
-    return [Finding("uncertain_site", text, "", ())]
 
 
 def _dead(fit: Regression, identified: NDArray[np.bool_]) -> str:

@@ -11,13 +11,14 @@ from inercal.estimate.basis import Basis, conditions_of, studied
 from inercal.estimate.budget import TypeA, TypeB, Uncertainty, combine
 from inercal.estimate.formula import Formula
 from inercal.estimate.identifiability import WORST_BY_LENGTH, Identifiability
+from inercal.estimate.remarks import ruled_by_site
 from inercal.estimate.result import Estimate, coverage_factor
 from inercal.findings import Finding, Status
 from inercal.records.places import counted
 from inercal.records.record import Record, recorded_temperature
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.model import FRAME
-from inercal.turntable.positions.outcome import COMMAND, of_site, unit_of_term
+from inercal.turntable.positions.outcome import COMMAND, unit_of_term
 from inercal.turntable.rate.fit import RateFit, approaches
 from inercal.turntable.rate.stays import Input, RateDwells
 from inercal.turntable.settings import TurntableSettings
@@ -71,7 +72,7 @@ def assemble(
         values,
         uncertainty,
         (status, message),
-        findings=(*findings, *of_site(names, uncertainty.budget, ("latitude",))),
+        findings=(*findings, *ruled_by_site(names, uncertainty.budget, ("latitude",), LIMITS.site_ratio)),
         statistics={
             "dof": float(min(fit.dof for fit in fits)),
             "condition": identified.condition,
