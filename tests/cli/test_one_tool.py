@@ -48,7 +48,7 @@ READ_A_STUDY = {
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor", "live", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
-    f"store {kind}" for kind in ("init", "upgrade", "check", "export", "import")
+    f"store {kind}" for kind in ("init", "upgrade", "check", "scrub", "export", "import")
 }
 TEMPLATES = {
     "imu": (partial(filled, "imu"), load_imu_study),
