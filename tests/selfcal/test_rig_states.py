@@ -9,7 +9,6 @@ from paper_study import ARCSEC, DEG, MICRO_G, study
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from inercal.estimate.kalman import empty_row
 from inercal.selfcal.before.bounds import recorded_bounds
 from inercal.selfcal.before.considered import sensitivities
 from inercal.selfcal.filters.problem import encoders_at, problem
@@ -132,7 +131,7 @@ def test_rows_of_the_accelerometers_are_derivatives(seed):
     settings = study(model=Model(WHOLE))
     posed, rng = problem(settings), np.random.default_rng(seed)
     c, w = random_vector(rng, settings), 0.03 * rng.standard_normal(3)
-    place, world, start = posed.states.layout.place, posed.world, Rotation.random(random_state=seed)
+    layout, world, start = posed.states.layout, posed.world, Rotation.random(random_state=seed)
     read = model.Rates(tuple(w), tuple(w))
 
     def outputs(error):
@@ -145,16 +144,13 @@ def test_rows_of_the_accelerometers_are_derivatives(seed):
         return accelerometer_outputs(then.inv().apply(base.apply(world.up))[None], rate[None], full, 0.7)[0]
 
     n = 3 + len(posed.names)
-    earth, up = (model.on_the_base(v, c) for v in (world.earth, world.up))
-    q = np.roll(start.as_quat(), 1)
-    sensed = model.sensing(tuple(q), read, earth, up, 0.7, c)
-    np.testing.assert_allclose(model.outputs(sensed, c), outputs(np.zeros(n)), atol=1e-8)
+    own, q = model.room(), tuple(np.roll(start.as_quat(), 1))
+    found, _ = model.accelerometers(q, read, 0.7, model.base_of(c, True, world), c, layout, own)
+    np.testing.assert_allclose(found, outputs(np.zeros(n)), atol=1e-8)
     size = np.append(np.full(3, 1e-4), posed.prior)
     rows = np.zeros((3, n))
     for i in range(3):
-        row = empty_row(linearised.WIDEST)
-        count = linearised.accelerometer_row(i, sensed, c, place, up, row)
-        rows[i, row.places[:count]] = row.values[:count]
+        rows[i, layout.rows[i, : layout.sizes[i]]] = own.entries[i, : layout.sizes[i]]
     for k in range(n):
         step = 0.1 * size[k] * np.eye(n)[k]
         expected = (outputs(step) - outputs(-step)) / 0.2
@@ -169,7 +165,7 @@ def test_columns_of_a_step_are_derivatives():
     settings = study(model=Model(WHOLE))
     posed, rng = problem(settings), np.random.default_rng(7)
     c, w, dt = random_vector(rng, settings), 0.3 * rng.standard_normal(3), 0.2
-    start, place = Rotation.random(random_state=1), posed.states.layout.place
+    start, layout = Rotation.random(random_state=1), posed.states.layout
     force, warm = (3.0, -6.0, 7.0), -0.7
 
     def after(states):
@@ -182,19 +178,19 @@ def test_columns_of_a_step_are_derivatives():
 
     x = c[posed.states.index]
     q = tuple(np.roll(after(x).as_quat(), 1))
-    rate = model.drifting(model.platform_rate(tuple(w), c), force, warm, c)
-    earth = model.on_the_base(posed.world.earth, c)
-    columns = linearised.empty_columns()
-    taken = linearised.Step(tuple(w), rate, earth, q, dt, force, warm)
-    count = linearised.dynamics_columns(c, place, taken, columns)
-    found = dict(zip(columns.places[:count].tolist(), columns.axes[:count], strict=True))
-    for k, name in enumerate(posed.names[18:], start=18):
+    own, p = model.room(), len(x)
+    rate, earth = (
+        model.turning(tuple(w), force, warm, c, layout, own),
+        model.base_of(c, True, posed.world).earth,
+    )
+    F = linearised.transition(tuple(w), rate, dt, q, earth, c, True)
+    found, each = np.empty((3, p)), np.vstack([np.zeros((3, p)), np.eye(p)])
+    linearised.times(F, each, layout, own, found, np.empty((3, p)))
+    for k, name in enumerate(posed.names):
         size = max(0.1 * posed.prior[k], 1e-7)
         step = size * np.eye(len(x))[k]
         expected = (after(x - step).inv() * after(x + step)).as_rotvec() / (2.0 * size)
-        np.testing.assert_allclose(
-            found.get(3 + k, np.zeros(3)), expected, rtol=1e-4, atol=1e-8, err_msg=name
-        )
+        np.testing.assert_allclose(found[:, k], expected, rtol=1e-4, atol=1e-8, err_msg=name)
 
 
 def moved(t):

@@ -155,7 +155,7 @@ def _terms_at(
     world, prior, dt = problem.world, problem.prior, recording.dt
     of_rows = sensed(q[1:], c, measured, problem)
     rig, by_start = problem.states.of_rig, np.zeros((3, len(c)))
-    base = on_base(problem.states.full(c)[:24], world)
+    base = on_base(problem.states.full(c), world, problem.states.layout.based)
     if rig:
         turn, slope = turns_on_rig(q[1:], recording.steps, c, problem)
         if of_encoders:

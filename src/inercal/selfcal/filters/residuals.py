@@ -182,9 +182,9 @@ class OnBase(NamedTuple):
     up_slope: Array | None
 
 
-def on_base(c: Array, world: World) -> OnBase:
+def on_base(c: Array, world: World, extended: bool) -> OnBase:
     """The world as coefficients (p,) have it: turned by beta, where ``d(R(beta) v) = -[R v]x Jr(-beta) dbeta``."""
-    if len(c) <= BETA.start:
+    if not extended:
         return OnBase(world.earth, world.up, None, None)
     turn = exp(c[BETA])
     earth, up = rotate(turn, world.earth), rotate(turn, world.up)
@@ -206,7 +206,7 @@ def sensed(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -
     world = problem.world
     if problem.states.of_rig:
         return _sensed_on_rig(q, c, measured, problem)
-    base = on_base(c, world)
+    base = on_base(c, world, problem.states.has("beta"))
     back = conjugate(q)
     f = rotate(back, base.up)
     through = np.array([[1.0 + c[15], 0.0, 0.0], [-c[4], 1.0 + c[16], 0.0], [c[3], -c[5], 1.0 + c[17]]])
