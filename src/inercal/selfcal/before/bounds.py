@@ -47,7 +47,6 @@ from inercal.selfcal.platform.model import (
     Room,
     accelerometers,
     base_of,
-    bent_and_late,
     encoders,
     force_within,
     room,
@@ -234,7 +233,7 @@ def _observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) 
     gain, own = work[0], work[1]
     for s in range(len(P)):
         inner, part = r if s == 0 or s == source else 0.0, P[s]
-        own[:] = 0.0
+        own.fill(0.0)
         for k in range(size):
             line, value = part[places[k]], values[k]  # rows are columns, and near each other
             for i in range(m):
@@ -316,7 +315,6 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                     floor = apart(noise, F.dt, sigma)
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
                     encoders(th[k], read, base, c, layout, world, own)
-                    bent_and_late(at, th[k], read, base, c, layout, world, own)
                     for i in range(3):
                         size = decorrelated_row(i, roots[i], layout.columns, own.axes, row)
                         _observe(P, row, size, 1.0, _PARTS[1], work)

@@ -47,7 +47,6 @@ from inercal.selfcal.platform.model import (
     WIDEST,
     accelerometers,
     base_of,
-    bent_and_late,
     encoders,
     room,
     specific_force,
@@ -189,7 +188,6 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
                 floor = apart(noise, F.dt, sigma)
                 roots, variances = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
                 encoders(th[k], read, base, c, layout, world, own)
-                bent_and_late(at, th[k], read, base, c, layout, world, own)
                 for i in range(3 if len(slopes) > 0 else 0):
                     size = encoder_row(i, layout.columns, own.axes, row)
                     _shown(P, S, row, size, variances[i], slopes[k, 3 + i])
@@ -234,7 +232,7 @@ def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> N
 @kernel
 def _seen(S: Array, row: Row, size: int, n: int, out: Array) -> None:
     """Put into ``out`` (m,) what a ``row`` sees of each error: ``S`` (n, m) of the error state, and of itself."""
-    out[:] = 0.0
+    out.fill(0.0)
     for a in range(size):
         at, value = row.places[a], row.values[a]
         if at < n:
@@ -251,7 +249,7 @@ def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array, shif
     places, values = row.places, row.values
     n, m = S.shape
     variance = r
-    gain[:] = 0.0
+    gain.fill(0.0)
     for a in range(size):
         if places[a] < n:
             line, value = P[places[a]], values[a]  # rows are columns, and near each other

@@ -42,7 +42,6 @@ from inercal.selfcal.platform.model import (
     Vectors,
     accelerometers,
     base_of,
-    bent_and_late,
     encoders,
     force_within,
     propagate,
@@ -104,7 +103,7 @@ def _corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
     for j in range(len(index)):
         c[index[j]] += x[3 + j]
     turned = normalize(multiply(q, exp((x[0], x[1], x[2]))))
-    x[:] = 0.0
+    x.fill(0.0)
     return turned
 
 
@@ -211,7 +210,6 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             of_encoders = encoders(angles, read, base, c, layout, world, own)
-            bent_and_late(of_encoders, angles, read, base, c, layout, world, own)
             watch(specific_force(of_encoders, base.up), gate, near)
         take = updating(gate, near)
         if history:

@@ -219,7 +219,7 @@ def _advance(
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rate, acc, th_m, _, _ = steps
-    n, p = len(P), len(c)
+    n, p = len(P), len(P) - 3
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted = empty_points(n), np.empty(p)
     moved, moves = np.zeros((2 * n + 1, 3)), empty_moments(n, 3)

@@ -20,7 +20,7 @@ from inercal.geometry.kernels import Quaternion, Vector
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.linearised import AXES, FLOOR, STIFF
-from inercal.selfcal.platform.model import Rates, Room, base_of, bent_and_late, encoders, room
+from inercal.selfcal.platform.model import Rates, Room, base_of, encoders, room
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import ALL, StateVector
 from inercal.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
@@ -202,5 +202,4 @@ def _encoders_at(th: Array, rate: Array, c: Array, layout: Layout, world: World,
     """The attitude (4,) of encoders, for `encoders_at`; its columns in ``own``."""
     w, base = (rate[0], rate[1], rate[2]), base_of(c, layout.based, world)
     q = encoders(th, Rates(w, w), base, c, layout, world, own)
-    bent_and_late(q, th, Rates(w, w), base, c, layout, world, own)
     return q

@@ -143,7 +143,7 @@ def _propagate(
     ``q`` (4,) and ``c`` (p,), ``extended`` or not, are the mean before, ``columns`` (n, n) the deviations of the
     points, row by row, n = 4 + p; ``ck`` (p,) is used up.
     """
-    n, p = len(columns), len(c)
+    n, p = len(columns), len(columns) - 4
     w, dt, walk = turn
     centre, z, odd = out
     earth, up = world.earth, world.up
@@ -187,7 +187,7 @@ def _advance(
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rates, acc, th, _, _ = steps
-    n, p = len(P), len(c)
+    n, p = len(P), len(P) - 4
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
     points, ck = empty_points(n), np.empty(p)
     z, odd, centre, shift = np.empty((1 + 2 * n + 6, 7)), np.empty((n, 7)), np.empty(7), np.empty(7)

@@ -75,9 +75,7 @@ def times(F: Transition, X: Array, layout: Layout, own: Room, top: Array, work: 
     """Put the first three rows of ``F X`` into ``top`` (3, m), ``X`` (n, m) a covariance, or sensitivities of attitude
     and states; quantities of the rate as `turning` left them in ``own``; ``work`` (3, m) is used up."""
     n, m, terms, w, dt = X.shape[0], X.shape[1], layout.terms, F.w, F.dt
-    for i in range(3):
-        for k in range(m):
-            work[i, k] = 0.0
+    work.fill(0.0)
     for a in range(layout.until[0]):  # each term is a row of one axis alone
         at, v, axis = terms[a, PLACE], own.of_rate[a], terms[a, AXIS]
         if 0 <= at < n:

@@ -243,65 +243,36 @@ def encoders(
     th: Vector | Array, read: Rates, base: Base, c: Array, layout: Layout, world: World, own: Room
 ) -> Quaternion:
     """Attitude (4,) of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc; its columns,
-    of the places ``layout.columns``, in ``own.axes``, but those of `bent_and_late`."""
-    angles, joints, axes, terms = own.small[1], own.small[2:], own.axes, layout.terms
-    first, last = layout.until[2], layout.until[3]
+    of the places ``layout.columns``, in ``own.axes``.
+
+    Turns of p by sag, and within a delay, of some 1e-4, are left out of the axes of what is before them.
+    """
+    joints, axes, terms, first = own.small[2:], own.axes, layout.terms, layout.until[2]
     joint_angles(th, c, layout, own)
-    waves = False
-    for a in range(first, last):
-        waves = waves or terms[a, QUANTITY] > 0
     q = chain(c, layout, world, own)
-    if waves:  # the axes are those at the angles as read
-        angles[0], angles[1], angles[2] = th[0], th[1], th[2]
-        for a in range(first, last):
-            if terms[a, QUANTITY] == 0:
-                angles[terms[a, AXIS]] -= c[terms[a, SLOT]]
-        chain(c, layout, world, own)
-    for a in range(first, last):
+    for a in range(first, layout.until[3]):
         at = terms[a, ENTRY]
         for i in range(3 if at >= 0 else 0):
             axes[at, i] = -own.quantities[a - first] * joints[terms[a, AXIS], i]
     q = (q[0], -q[1], -q[2], -q[3])
-    if layout.bent:
-        q = multiply(q, bending(specific_force(q, base.up), c))
-    if layout.late_encoders:
-        rate, tau = turning(rate_at(read, c[TAU]), STILL, 0.0, c, layout, own), c[TAU]
-        if layout.turning.all():
-            return propagate(q, rate, base.earth, tau)
-        of_earth = specific_force(q, base.earth)
-        over = (rate[0] - of_earth[0], rate[1] - of_earth[1], rate[2] - of_earth[2])
-        by = about_turning(over, th, layout.turning, world.axes, world.signs)
-        q = multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
-    return q
-
-
-@merged
-def bent_and_late(
-    q: Quaternion,
-    th: Vector | Array,
-    read: Rates,
-    base: Base,
-    c: Array,
-    layout: Layout,
-    world: World,
-    own: Room,
-) -> None:
-    """Put the encoders' columns of sag and delay, at attitude ``q`` (4,), into ``own.axes``."""
-    axes = own.axes
     if layout.bent:
         f = specific_force(q, base.up)
         for i in range(3):
             at = layout.bend[i]
             if at >= 0:
                 axes[at, 0], axes[at, 1], axes[at, 2] = cross(unit(i, 1.0), f)
-    if layout.late[0] >= 0:
-        rate, v = (
-            turning(rate_at(read, c[TAU]), STILL, 0.0, c, layout, own),
-            specific_force(q, base.earth),
-        )
-        over = (rate[0] - v[0], rate[1] - v[1], rate[2] - v[2])
+        q = multiply(q, bending(f, c))
+    if layout.late_encoders:
+        rate, tau = turning(rate_at(read, c[TAU]), STILL, 0.0, c, layout, own), c[TAU]
+        of_earth = specific_force(q, base.earth)
+        over = (rate[0] - of_earth[0], rate[1] - of_earth[1], rate[2] - of_earth[2])
         by = about_turning(over, th, layout.turning, world.axes, world.signs)
-        axes[layout.late[0], 0], axes[layout.late[0], 1], axes[layout.late[0], 2] = by
+        if layout.late[0] >= 0:
+            axes[layout.late[0], 0], axes[layout.late[0], 1], axes[layout.late[0], 2] = by
+        if layout.turning.all():
+            return propagate(q, rate, base.earth, tau)
+        q = multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
+    return q
 
 
 @merged
@@ -325,7 +296,10 @@ def sensed(
     q: Quaternion, rate: Vector, over: Vector, warm: float, base: Base, c: Array, layout: Layout, own: Room
 ) -> tuple[Vector, Vector]:
     """`accelerometers` of a platform that has attitude ``q`` when they read, and turns then at ``rate`` (3,) [rad/s]
-    against inertial space, ``over`` (3,) [rad/s] the base."""
+    against inertial space, ``over`` (3,) [rad/s] the base.
+
+    What of an output is not linear in the signal, K2 and by temperature, is left out of derivatives by others.
+    """
     out, entries, terms, until = own.small[0], own.entries, layout.terms, layout.until
     f = specific_force(q, base.up)
     gx, gy, gz = 1.0 + c[15], 1.0 + c[16], 1.0 + c[17]
@@ -340,22 +314,18 @@ def sensed(
             entries[i, terms[a, ENTRY]] = v * gains[i][i]
     x, y, z = out[0], out[1], out[2]
     for i in range(3):
-        entries[i, 3], entries[i, 4] = 1.0, f[i]
-    entries[1, 5], entries[2, 5], entries[2, 6] = -f[0], f[0], -f[1]
+        entries[i, 3], entries[i, 4] = 1.0, out[i]
+    entries[1, 5], entries[2, 5], entries[2, 6] = -x, x, -y
     sx, sy, sz = gx * x, gy * y - c[4] * x, gz * z + c[3] * x - c[5] * y
     out[0], out[1], out[2] = c[12] + sx, c[13] + sy, c[14] + sz
     if until[2] > until[1]:
         quantities = own.quantities
         signals(sx, sy, sz, warm, c, quantities)
         for a in range(until[1], until[2]):
-            out[terms[a, AXIS]] += c[terms[a, SLOT]] * quantities[terms[a, QUANTITY]]
-        if until[1] > until[0]:  # columns are those at the centre of the gimbals
-            signals(
-                gx * f[0], gy * f[1] - c[4] * f[0], gz * f[2] + c[3] * f[0] - c[5] * f[1], warm, c, quantities
-            )
-        for a in range(until[1], until[2]):
+            i, by = terms[a, AXIS], quantities[terms[a, QUANTITY]]
+            out[i] += c[terms[a, SLOT]] * by
             if terms[a, ENTRY] >= 0:
-                entries[terms[a, AXIS], terms[a, ENTRY]] = quantities[terms[a, QUANTITY]]
+                entries[i, terms[a, ENTRY]] = by
     turned = turned_by_beta(base.up, q, c) if layout.based else (STILL, STILL, STILL)
     for i in range(3):
         g, behind = gains[i], layout.begin[i]
@@ -365,8 +335,8 @@ def sensed(
             entries[i, behind + layout.late[1]] = -(turn[0] * over[0] + turn[1] * over[1] + turn[2] * over[2])
         for j in range(3):
             if layout.base[j] >= 0:
-                by = turned[j]
-                entries[i, behind + layout.base[j]] = g[0] * by[0] + g[1] * by[1] + g[2] * by[2]
+                d = turned[j]
+                entries[i, behind + layout.base[j]] = g[0] * d[0] + g[1] * d[1] + g[2] * d[2]
     return (out[0], out[1], out[2]), f
 
 

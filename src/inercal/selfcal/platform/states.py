@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.instruments.terms import term
-from inercal.selfcal.platform.layout import Layout, by_axis, entries, layout_of
+from inercal.selfcal.platform.layout import Entry, Layout, by_axis, entries, layout_of
 
 
 class State(NamedTuple):
@@ -194,9 +194,11 @@ WALK: Final = ALL.index("kg0_walk_x")
 """Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of harmonics a sine and
 a cosine of each; of walks gyros, accelerometers."""
 
-_ENTRIES: Final = tuple(
-    entry for state in STATES.values() for entry in entries(state.enters, len(state.parameters))
-)
+ENTRY_OF: Final[Mapping[str, Entry]] = {
+    name: entry
+    for state in STATES.values()
+    for name, entry in zip(state.parameters, entries(state.enters, len(state.parameters)), strict=True)
+}
 """The entry of each parameter of the full vector."""
 
 
@@ -218,7 +220,7 @@ class StateVector:
     @cached_property
     def layout(self) -> Layout:
         """The same for kernels."""
-        return layout_of(_ENTRIES, self.index, self.stated, self.harmonics, self.fixed, WALK)
+        return layout_of(tuple(ENTRY_OF.values()), self.index, self.stated, self.harmonics, self.fixed, WALK)
 
     def full(self, c: Array) -> Array:
         """The full vector (K,) of states ``c`` (p,), linear form."""
