@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from inercal.arrays import Array
 from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.instruments.triad import TriadModel
 from inercal.selfcal.platform.layout import QUANTITIES
+from inercal.selfcal.platform.model import output_quantities, rate_quantities
 from inercal.selfcal.platform.states import BIAS_WALK, ENTRY_OF, KIND_OF
 
 _ROUNDS = 6
@@ -102,13 +104,13 @@ class RigPlatform:
 
     def _beside_rate(self, rate: Array, force: Array, warm: Array) -> Array:
         """What is added to the rate of the triad, by the quantities in the order of the table."""
-        quantities = (*_axes(rate), *_axes(0.5 * np.abs(rate)), *_axes(force), warm, np.ones(1))
+        quantities = _plain(rate_quantities)(_axes(rate), _axes(force), warm)
         return _total(self.rate[:, _LINEAR:], quantities[_LINEAR:])
 
     def _beside_output(self, s: Array, warm: Array) -> Array:
         """What is added to the outputs ``s`` of the triad without bias."""
         by = s / self.accelerometer.scale
-        return _total(self.output, (*_axes(s * by), warm, *_axes(warm * by), np.ones(1)))
+        return _total(self.output, _plain(output_quantities)(_axes(s), _axes(by), warm))
 
     def unbent(self, v: Array, force: Array) -> Array:
         """A vector (*batch, 3) of p in the axes of the unbent platform; ``force`` (*batch, 3) [m/s^2] in p."""
@@ -126,6 +128,11 @@ class RigPlatform:
         return force
 
 
+def _plain(kernel: Any) -> Any:
+    """A kernel as plain Python, which takes arrays as well."""
+    return getattr(kernel, "py_func", kernel)
+
+
 def _axes(v: Array) -> list[Array]:
     """Components (*batch, 1) of vectors."""
     return [v[..., i, None] for i in range(3)]
@@ -134,7 +141,7 @@ def _axes(v: Array) -> list[Array]:
 def _total(coefficients: Array, quantities: Sequence[Array]) -> Array:
     """Sum (*batch, 3) of coefficients (3, n) times n quantities (*batch, 1), to the same digits in any batch."""
     total = np.zeros(3)
-    for k, quantity in enumerate(quantities):
-        if coefficients[:, k].any():
-            total = total + quantity * coefficients[:, k]
+    for column, quantity in zip(coefficients.T, quantities, strict=True):
+        if column.any():
+            total = total + quantity * column
     return total

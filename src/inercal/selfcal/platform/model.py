@@ -121,6 +121,13 @@ def force_within(q: Quaternion, w: Vector, by: float, up: Vector, wanted: bool) 
     return specific_force(multiply(q, exp((by * w[0], by * w[1], by * w[2]))), up) if wanted else STILL
 
 
+@kernel
+def rate_quantities(w: Vector, f: Vector, warm: float) -> tuple[float, ...]:
+    """Quantities of the rate, in the order of `QUANTITIES`; as plain Python it also takes arrays."""
+    asymmetry = (0.5 * abs(w[0]), 0.5 * abs(w[1]), 0.5 * abs(w[2]))
+    return (*w, *asymmetry, *f, warm, 1.0)
+
+
 @merged
 def turning(w: Vector, f: Vector, warm: float, c: Array, layout: Layout, own: Room) -> Vector:
     """Rate ``w_Ip^p`` (3,) [rad/s] of a platform that is commanded ``w`` (3,), at specific force ``f`` (3,) [m/s^2] and
@@ -130,12 +137,13 @@ def turning(w: Vector, f: Vector, warm: float, c: Array, layout: Layout, own: Ro
     z = w[2] + c[2] + c[8] * w[0] - c[11] * w[1]
     if layout.until[0] == 0:
         return x, y, z
-    v, total, terms = own.quantities, own.small[0], layout.terms
-    total[0], total[1], total[2], v[9], v[10] = x, y, z, warm, 1.0
-    for i in range(3):
-        v[i], v[3 + i], v[6 + i] = w[i], 0.5 * abs(w[i]), f[i]
+    quantities, total, terms = own.quantities, own.small[0], layout.terms
+    total[0], total[1], total[2] = x, y, z
+    v = rate_quantities((w[0], w[1], w[2]), f, warm)
+    for i in range(len(v)):
+        quantities[i] = v[i]
     for a in range(layout.until[0]):
-        own.of_rate[a] = v[terms[a, QUANTITY]]
+        own.of_rate[a] = quantities[terms[a, QUANTITY]]
         total[terms[a, AXIS]] += c[terms[a, SLOT]] * own.of_rate[a]
     return total[0], total[1], total[2]
 
@@ -291,6 +299,13 @@ def accelerometers(
     return sensed(q, rate, over, warm, base, c, layout, own)
 
 
+@kernel
+def output_quantities(s: Vector, by: Vector, warm: float) -> tuple[float, ...]:
+    """Quantities of the outputs, in the order of `QUANTITIES`: ``s`` (3,) [m/s^2] are outputs without bias, ``by`` the
+    same over their scales; as plain Python it also takes arrays."""
+    return s[0] * by[0], s[1] * by[1], s[2] * by[2], warm, warm * by[0], warm * by[1], warm * by[2], 1.0
+
+
 @merged
 def sensed(
     q: Quaternion, rate: Vector, over: Vector, warm: float, base: Base, c: Array, layout: Layout, own: Room
@@ -319,8 +334,9 @@ def sensed(
     sx, sy, sz = gx * x, gy * y - c[4] * x, gz * z + c[3] * x - c[5] * y
     out[0], out[1], out[2] = c[12] + sx, c[13] + sy, c[14] + sz
     if until[2] > until[1]:
-        quantities = own.quantities
-        signals(sx, sy, sz, warm, c, quantities)
+        quantities, made = own.quantities, output_quantities((sx, sy, sz), (sx / gx, sy / gy, sz / gz), warm)
+        for k in range(len(made)):
+            quantities[k] = made[k]
         for a in range(until[1], until[2]):
             i, by = terms[a, AXIS], quantities[terms[a, QUANTITY]]
             out[i] += c[terms[a, SLOT]] * by
@@ -338,11 +354,3 @@ def sensed(
                 d = turned[j]
                 entries[i, behind + layout.base[j]] = g[0] * d[0] + g[1] * d[1] + g[2] * d[2]
     return (out[0], out[1], out[2]), f
-
-
-@kernel
-def signals(x: float, y: float, z: float, warm: float, c: Array, out: Array) -> None:
-    """Put the quantities of the outputs into ``out``, of signals ``x``, ``y``, ``z`` [m/s^2] without bias."""
-    by_x, by_y, by_z = x / (1.0 + c[15]), y / (1.0 + c[16]), z / (1.0 + c[17])
-    out[0], out[1], out[2] = x * by_x, y * by_y, z * by_z
-    out[3], out[4], out[5], out[6], out[7] = warm, warm * by_x, warm * by_y, warm * by_z, 1.0
