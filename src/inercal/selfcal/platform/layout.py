@@ -21,7 +21,7 @@ from inercal.arrays import Array
 QUANTITIES: Final[Mapping[str, tuple[str, ...]]] = {
     "rate": ("w_x", "w_y", "w_z", "|w_x|/2", "|w_y|/2", "|w_z|/2", "f_x", "f_y", "f_z", "warm", "1"),
     "force": tuple(f"ww_{i}{j}" for i in "xyz" for j in "xyz"),
-    "output": ("s2_x", "s2_y", "s2_z", "warm", "warm_x", "warm_y", "warm_z", "1", "s_xy", "s_yz", "s_zx"),
+    "output": ("s2_x", "s2_y", "s2_z", "warm", "warm_x", "warm_y", "warm_z", "1"),
     "angle": ("1", "sin", "cos"),
 }
 """Linear port -> its quantities, in the order in which the model fills them in."""

@@ -303,8 +303,7 @@ def accelerometers(
 def output_quantities(s: Vector, by: Vector, warm: float) -> tuple[float, ...]:
     """Quantities of the outputs, in the order of `QUANTITIES`: ``s`` (3,) [m/s^2] are outputs without bias, ``by`` the
     same over their scales; as plain Python it also takes arrays."""
-    coupled = (s[0] * by[1], s[1] * by[2], s[2] * by[0])
-    return s[0] * by[0], s[1] * by[1], s[2] * by[2], warm, warm * by[0], warm * by[1], warm * by[2], 1.0, *coupled
+    return s[0] * by[0], s[1] * by[1], s[2] * by[2], warm, warm * by[0], warm * by[1], warm * by[2], 1.0
 
 
 @merged

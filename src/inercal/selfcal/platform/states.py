@@ -97,11 +97,6 @@ STATES: Final[Mapping[str, State]] = {
         _by_axis("K2"), "quadratic", "20 ug/g^2", "0(20) ug/g^2",
         "second-order coefficients of accelerometers", by_axis("output", "s2_*"), "k2", _IEEE_1293,
     ),
-    "cross_axis": State(
-        _by_axis("Kip"), "quadratic", "20 ug/g^2", "0(20) ug/g^2",
-        "cross-coupling of accelerometer x with y, y with z, z with x", "output x s_xy, y s_yz, z s_zx", "cross_axis",
-        _IEEE_1293,
-    ),
     "levers": State(
         tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "length", "50 mm", "0(50) mm",
         "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z",
