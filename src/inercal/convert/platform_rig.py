@@ -103,12 +103,12 @@ class RigPlatform:
         return rate
 
     def _beside_rate(self, rate: Array, force: Array, warm: Array) -> Array:
-        """What is added to the rate of the triad, by the quantities in the order of the table."""
+        """The part of the rate beside that of the triad, by the quantities in the order of the table."""
         quantities = _plain(rate_quantities)(_axes(rate), _axes(force), warm)
         return _total(self.rate[:, _LINEAR:], quantities[_LINEAR:])
 
     def _beside_output(self, s: Array, warm: Array) -> Array:
-        """What is added to the outputs ``s`` of the triad without bias."""
+        """The part of the outputs beside ``s``, those of the triad without bias."""
         by = s / self.accelerometer.scale
         return _total(self.output, _plain(output_quantities)(_axes(s), _axes(by), warm))
 
