@@ -87,7 +87,13 @@ def inlined(function: F) -> F:
     return _compiled(function, "always", counting=False)
 
 
-def _compiled(function: F, inline: Literal["never", "always"], counting: bool) -> F:
+def merged(function: F) -> F:
+    """A kernel whose machine code becomes part of each caller's: for one that takes many arrays, since each costs seven
+    words at a call."""
+    return _compiled(function, "never", counting=False, forced=True)
+
+
+def _compiled(function: F, inline: Literal["never", "always"], counting: bool, forced: bool = False) -> F:
     """The function as numba compiles it when it is first called."""
     folder = cache_folder()
     config = cast(Any, numba.core.config)
@@ -95,6 +101,8 @@ def _compiled(function: F, inline: Literal["never", "always"], counting: bool) -
     config.CACHE_DIR = "" if folder is None else str(folder)
     try:
         options = {"nogil": True, "cache": folder is not None, "inline": inline, "_nrt": counting}
+        if forced:
+            options["forceinline"] = True
         return cast(F, cast(Any, numba.njit)(**options)(function))
     finally:
         config.CACHE_DIR = before

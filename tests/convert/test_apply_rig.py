@@ -16,6 +16,7 @@ from inercal.findings import Status
 from inercal.records.record import record_of
 from inercal.records.write import write_record
 from inercal.selfcal.platform.coefficients import NAMES, units
+from inercal.selfcal.platform.states import ALL
 from inercal.units import parse_unit
 
 RIG = {
@@ -120,12 +121,25 @@ def test_what_a_record_lacks_is_left_out_and_said():
     texts = [finding.message for finding in made.findings if finding.code == "not_held"]
     assert texts == [
         "kg0_T1, ka0_T1, ka1_T1 are not applied: the record has no temperature",
-        "G, sag are not applied: the record has no specific force acc_x to z",
+        "g_sensitivity, sag are not applied: the record has no specific force acc_x to z",
     ]
     still, _ = instrument(w, 0.0 * f, np.zeros((60, 1)))
     np.testing.assert_allclose(si(made, "gyro"), still, rtol=0, atol=1e-15)
     (said,) = not_applied(estimate())
     assert said.message == "errors of the rig are not applied: gamma_x"
+
+
+def test_each_state_is_applied_or_named():
+    """Of all states that a platform may have: one that is estimated changes the corrected readings, or is said."""
+    f, w, warm = drawn()
+    given = record(acc=f, gyro=w, temperature=20.0 + warm[:, 0])
+    plain = apply_to(given, platform_model(estimate({})))
+    for name in ALL[18:]:
+        found = estimate({name: 1e-3})
+        made, said = apply_to(given, platform_model(found)), not_applied(found)
+        changed = any(not np.array_equal(si(made, sensor), si(plain, sensor)) for sensor in ("acc", "gyro"))
+        assert changed == (not said), name
+        assert all(name in finding.message or name.startswith("beta_") for finding in said)
 
 
 def test_columns_on_other_clocks_are_refused():
@@ -177,8 +191,6 @@ temperature = "20 degC"
         text.replace('"0.0005 deg/sqrt(h)"', '"1e-9 deg/sqrt(h)"').replace('"10.0 ug"', '"1e-6 ug"')
     )
     settings, made = ic.study(path).settings, ic.simulate(path, np.random.default_rng(1))
-    from inercal.selfcal.platform.states import ALL
-
     true = dict(zip(ALL, settings.true_values, strict=True))
     found = apply_to(made, platform_model(estimate(true)))
     q = np.stack([made[f"q_ref_{k}"].values for k in (1, 2, 3, 0)], axis=-1)

@@ -47,7 +47,7 @@ def nees(found, truth):
 
 def linear_truth(settings, made, told):
     """True coefficients, linear form, with beta against the base found."""
-    truth = made.truth.copy()
+    truth = made.truth[:24].copy()
     truth[BETA] = relative(truth[BETA], settings.base, told.base)
     return truth
 
@@ -101,7 +101,7 @@ def test_any_heading_is_found(degrees):
     miss = math.remainder(told.base.heading - math.radians(degrees), 2 * math.pi)
     assert u[22] < math.radians(0.1)
     assert abs(miss + found.coefficients[22]) < 5 * u[22]
-    assert np.abs((found.coefficients - made.truth)[:18] / u[:18]).max() < 5.0
+    assert np.abs((found.coefficients[:18] - made.truth[:18]) / u[:18]).max() < 5.0
 
 
 @pytest.mark.slow

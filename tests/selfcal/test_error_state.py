@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from paper_study import PRIOR, study
 
-from inercal.estimate.kalman import empty_row
 from inercal.geometry.rotations import (
     boxminus,
     boxplus,
@@ -20,12 +19,13 @@ from inercal.geometry.rotations import (
 )
 from inercal.selfcal.before.simulate import experiment, simulate
 from inercal.selfcal.filters import error_state
+from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.selfcal.filters.problem import Start, problem
 from inercal.selfcal.filters.run import estimate
 from inercal.selfcal.platform import linearised, model
 from inercal.selfcal.platform.kinematics import attitude, joint_axes
-from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.platform.states import EXTENDED_MODEL, state_vector
+from inercal.selfcal.platform.rig import Gimbals, World
+from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, state_vector
 from inercal.selfcal.settings import Filter
 
 EXTENDED = Filter(extended=True)
@@ -143,8 +143,13 @@ def test_the_kernel_is_its_matrix_twin(short, extended):
     assert found.nis == pytest.approx(nis, rel=1e-6)
 
 
-#: of the extended model
-PLACE = state_vector(EXTENDED_MODEL).layout.place
+LAYOUT = state_vector(EXTENDED_MODEL).layout
+NO_RIG = np.zeros(len(ALL) - 24)
+
+
+def on(v):
+    """A world in which a vector (3,) is both earth rate and specific force."""
+    return World(v, v, Gimbals().index, Gimbals().sign)
 
 
 def random_case(seed):
@@ -169,7 +174,7 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     def step(error):
         moved = c + error[3:]
         start = boxplus(q, error[:3])
-        end = model.propagate(start, model.platform_rate(w, moved), model.on_the_base(earth, moved), dt)
+        end = model.propagate(start, platform_rate(w, moved, True), on_the_base(earth, moved, True), dt)
         return np.array(end)
 
     h, base = 1e-6, step(np.zeros(27))
@@ -181,9 +186,10 @@ def test_the_transition_is_the_derivative_of_the_step(seed, turn):
     A = rng.standard_normal((27, 27))
     P = A @ A.T
     expected = F @ P @ F.T + np.diag(np.r_[np.full(3, 0.4), np.zeros(24)])
-    rate, earth_e = model.platform_rate(w, c), model.on_the_base(earth, c)
-    taken = linearised.Step(tuple(w), rate, earth_e, tuple(base), dt, (0.0, 0.0, 0.0), 0.0)
-    linearised.propagate_covariance(P, c, PLACE, taken, 0.4, np.empty((3, 27)), linearised.empty_columns())
+    own, full = model.room(), np.append(c, NO_RIG)
+    rate, earth_e = model.turning(tuple(w), model.STILL, 0.0, full, LAYOUT, own), on_the_base(earth, c, True)
+    F = linearised.transition(tuple(w), rate, dt, tuple(base), earth_e, full, True)
+    linearised.propagate_covariance(P, F, LAYOUT, own, 0.4, np.empty((3, 27)), np.empty((3, 27)))
     # the kernel takes the earth's turn within a step for small
     assert np.abs(P - expected).max() < 10.0 * turn * np.abs(expected).max()
     assert np.array_equal(P, P.T)
@@ -197,19 +203,16 @@ def test_accelerometer_rows_are_derivatives(seed):
 
     def read(error):
         moved = c + error[3:]
-        f = model.specific_force(tuple(boxplus(q, error[:3])), model.on_the_base(up, moved))
-        return np.array(model.accelerometers(f, moved))
+        f = model.specific_force(tuple(boxplus(q, error[:3])), on_the_base(up, moved, True))
+        return np.array(accelerometers(f, moved))
 
     h = 1e-6
     differences = np.stack([(read(e) - read(-e)) / (2 * h) for e in h * np.eye(27)], axis=1)
-    up_e = model.on_the_base(up, c)
-    still = (0.0, 0.0, 0.0)
-    sensed = model.sensing(tuple(q), model.Rates(still, still), still, up_e, 0.0, c)
+    own, full, still = model.room(), np.append(c, NO_RIG), model.Rates(model.STILL, model.STILL)
+    model.accelerometers(tuple(q), still, 0.0, model.base_of(full, True, on(up)), full, LAYOUT, own)
     for i in range(3):
-        row = empty_row(linearised.WIDEST)
-        size = linearised.accelerometer_row(i, sensed, c, PLACE, up_e, row)
-        whole = np.zeros(27)
-        whole[row.places[:size]] = row.values[:size]
+        whole, size = np.zeros(27), LAYOUT.sizes[i]
+        whole[LAYOUT.rows[i, :size]] = own.entries[i, :size]
         assert whole == pytest.approx(differences[i], abs=1e-8)
 
 

@@ -13,18 +13,15 @@ from scipy.stats import chi2, kstest
 from inercal.errors import StudyError
 from inercal.geometry.rotations import attitude_difference, conjugate, exp, multiply, normalize, rotate
 from inercal.selfcal.before.simulate import experiment, flicker, simulate, to_record
+from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.selfcal.filters.residuals import gimbals
+from inercal.selfcal.platform import model
 from inercal.selfcal.platform.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
-from inercal.selfcal.platform.model import (
-    Truth,
-    accelerometers,
-    on_the_base,
-    platform_rate,
-    simulate_truth,
-    specific_force,
-)
+from inercal.selfcal.platform.model import specific_force
 from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
 from inercal.selfcal.platform.rig import Base, Gimbals
+from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
+from inercal.selfcal.platform.truth import Truth, simulate_truth
 from inercal.selfcal.settings import Disturbances, Noise
 
 PLAN = Plan(
@@ -89,7 +86,9 @@ def test_noise_is_integrated_at_the_finer_step_as_in_plain_numpy():
     c = to_linear(LARGE)
     q, acc = np.empty((n, 4)), np.empty((n, 3))
     q0 = normalize(rng.normal(size=4))
-    simulate_truth(q0, w, dt, noise, np.zeros(n), c, place, Truth(q, acc, np.empty((n, 3))))
+    full = np.append(c, np.zeros(len(ALL) - 24))
+    out = Truth(q, acc, np.empty((n, 3)))
+    simulate_truth(q0, w, dt, noise, np.zeros(n), full, StateVector((), full).layout, place, out)
     zero = exp(c[BETA])
     earth, up, M, at = rotate(zero, place.earth), rotate(zero, place.up), error_matrix(c), q0
     pz, oy, oz = c[ETA]
@@ -108,9 +107,19 @@ def test_the_kernels_of_the_model_by_hand(size):
     c, v = np.zeros(24), rng.normal(size=3)
     c[:size] = rng.normal(0.0, 0.1, size)
     q = normalize(rng.normal(size=4))
-    assert_allclose(platform_rate(v, c[:size]), v + error_matrix(c) @ v + c[KG0], atol=1e-14)
-    assert_allclose(on_the_base(v, c[:size]), rotate(exp(c[BETA]), v), atol=1e-14)
+    assert_allclose(platform_rate(v, c[:size], size > 18), v + error_matrix(c) @ v + c[KG0], atol=1e-14)
+    assert_allclose(on_the_base(v, c[:size], size > 18), rotate(exp(c[BETA]), v), atol=1e-14)
     assert_allclose(specific_force(q, v), rotate(conjugate(q), v), atol=1e-14)
+    # they are those of the one model, without its rig
+    full, own, up = np.append(c, np.zeros(len(ALL) - 24)), model.room(), study(**RIG).world.up
+    layout = state_vector(EXTENDED_MODEL if size == 24 else PAPER).layout
+    base, still = model.base_of(full, layout.based, study(**RIG).world), (0.0, 0.0, 0.0)
+    assert_allclose(
+        model.turning(tuple(v), still, 0.0, full, layout, own), platform_rate(v, c, size > 18), atol=1e-14
+    )
+    f = specific_force(tuple(q), on_the_base(up, c, size > 18))
+    read = model.accelerometers(tuple(q), model.Rates(still, still), 0.0, base, full, layout, own)
+    assert_allclose(read, (accelerometers(f, c), f), atol=1e-12)
     # product form in, linear form inside: the same outputs
     assert_allclose(accelerometers(tuple(v), to_linear(c[:size])), product_form(v[None], c)[0], atol=1e-14)
 

@@ -7,9 +7,9 @@ it to turn at a wanted rate the command is
 
 of which the familiar ``w_p - M w_p - kg0`` is the first order: that leaves M (M w_p + kg0), at 1 deg/s and
 misalignments of 100 arcsec 0.001 deg/h, as much as a good calibration still sees, so the inverse is taken. Gyros that
-took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured. Where the result
-has drift by force, sag, temperature, squares of accelerometers or asymmetry of scales, these are corrected for too
-(`inercal.convert.platform_rig`).
+took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured. What else the
+result has of rates, outputs and sag is corrected for too (`inercal.convert.platform_rig`); what is of angles, times and
+places is named.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.convert.correction import Correction, Samples, factor_of, one_clock
-from inercal.convert.platform_rig import BY_FORCE, BY_TEMPERATURE, RigPlatform
+from inercal.convert.platform_rig import RigPlatform, applied, at_port, in_need
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
 from inercal.findings import Finding
@@ -36,11 +36,6 @@ COMMAND = "selfcal"
 
 _WORST = 1e6
 """Condition number beyond which a gain is not inverted; a platform has one near 1."""
-
-#: kinds of coefficients that are of angles, times and places
-_UNAPPLIED = (
-    "gamma", "non_orthogonality", "zero_y", "delay", "levers", "harmonics", "gyro_walk", "accelerometer_walk",
-)  # fmt: skip
 
 #: sensor -> dimension of its channels
 _SENSORS = {"wc": "rate", "gyro": "rate", "acc": "acceleration"}
@@ -114,14 +109,12 @@ class PlatformModel:
         """True where the temperature of a record counts; findings on what it lacks."""
         column = record.columns.get("temperature")
         known = column is not None and column.unit.dimension == "temperature" and self.temperature is not None
-        by_temperature, by_force = self.rig.needs(BY_TEMPERATURE), self.rig.needs(BY_FORCE)
+        by_temperature, by_force = self.rig.by_temperature, self.rig.by_force
         texts = []
         if by_temperature and not known:
-            texts.append(f"{', '.join(by_temperature)} are not applied: the record has no temperature")
+            texts.append(f"{by_temperature} are not applied: the record has no temperature")
         if by_force and "acc" not in sensors:
-            texts.append(
-                f"{', '.join(by_force)} are not applied: the record has no specific force acc_x to z"
-            )
+            texts.append(f"{by_force} are not applied: the record has no specific force acc_x to z")
         return bool(by_temperature) and known, tuple(Finding("not_held", text) for text in texts)
 
     def _worked(self, given: Mapping[str, Array], warm: Array, invert: bool) -> dict[str, Array]:
@@ -163,12 +156,14 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
         return x, y, z
 
     ds, do = triple("ds"), triple("do")
-    scale = 1.0 + np.array(triple("kg1"))
-    M = np.array([[0.0, ds[0], -do[0]], [-do[1], 0.0, ds[1]], [ds[2], -do[2], 0.0]])
+    at_rate = at_port("rate", values)
+    gain = np.eye(3) + at_rate[:, :3]
+    gain += [[0.0, ds[0], -do[0]], [-do[1], 0.0, ds[1]], [ds[2], -do[2], 0.0]]
+    scale = np.diag(gain)
     acc_scale = 1.0 + np.array(triple("ka1"))
     pz, oy, oz = (values[f"eta_{end}"] for end in ("pz", "oy", "oz"))
     with np.errstate(all="ignore"):
-        platform = TriadModel(scale, np.eye(3) + M / scale[:, None], np.array(triple("kg0")))
+        platform = TriadModel(scale, gain / scale[:, None], np.array(triple("kg0")))
         accelerometer = TriadModel(
             acc_scale,
             np.array([[1.0, 0.0, 0.0], [-oy, 1.0, 0.0], [pz, -oz, 1.0]]),
@@ -179,14 +174,9 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
     if not sound:
         raise InputError(where, "the coefficients of the platform cannot be inverted, expected small errors")
     rig = RigPlatform(
-        platform,
-        accelerometer,
-        np.array(triple("K2")),
-        np.array(triple("S_asym")),
-        np.array([[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"]),
-        np.array(triple("sag")),
-        *(np.array([values.get(f"{of}_{i}_T1", 0.0) for i in "xyz"]) for of in ("kg0", "ka0", "ka1")),
-    )
+        platform, accelerometer, at_rate, at_port("output", values), np.array(triple("sag")),
+        in_need(values, "f"), in_need(values, "warm"),
+    )  # fmt: skip
     stated = estimate.conditions.get("temperature")
     value = stated.get("value") if isinstance(stated, Mapping) else None
     return PlatformModel(
@@ -196,9 +186,9 @@ def platform_model(estimate: Estimate, where: object = "calibration") -> Platfor
 
 def not_applied(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:
     """``not_held``: the coefficients that `platform_model` leaves out."""
-    left = [name for name in estimate.names if KIND_OF.get(name) in _UNAPPLIED]
+    left = [name for name in estimate.names if not applied(name) and KIND_OF.get(name) != "beta"]
     texts = []
-    if "beta_x" in estimate.names:
+    if any(KIND_OF.get(name) == "beta" for name in estimate.names):
         texts.append("the zero of the encoders beta is not applied: gimbal angles stay as they are")
     if left:
         texts.append(f"errors of the rig are not applied: {', '.join(left)}")

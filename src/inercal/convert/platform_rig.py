@@ -1,100 +1,116 @@
-"""A platform beside its linear triads: drift by force, sag, temperature, squares of accelerometers, scale asymmetry.
+"""A platform beside its linear triads: what the table of states has at the rate, at the outputs, and sag.
 
 With f the specific force in p, w the rate commanded or measured, T kelvins above the temperature of the coefficients
 (`inercal.selfcal.platform.model`):
 
-    w_p = (1 + M) w + S |w| / 2 + kg0 + kg0_T1 T + G f,
-    a   = ka0 + ka0_T1 T + (1 + ka1_T1 T / (1 + ka1)) s + K2 s^2 / (1 + ka1),   s the linear part of the output.
+    w_p = (1 + M) w + kg0 + sum c v(w, f, T),   a = ka0 + s + sum c v(s, T),   s the linear part of the output,
 
-Vectors are given in the axes of the unbent platform: ``v = exp(sag x f) v_p``. What needs f or T of a record that has
-none is left out, and named.
+v the quantities of `inercal.selfcal.platform.layout`. Vectors are given in the axes of the unbent platform:
+``v = exp(sag x f) v_p``. What needs f or T of a record that has none is left out, and named.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from inercal.arrays import Array
 from inercal.geometry.rotations import conjugate, exp, rotate
-from inercal.instruments.triad import TriadModel, apart
+from inercal.instruments.triad import TriadModel
+from inercal.selfcal.platform.layout import QUANTITIES
+from inercal.selfcal.platform.model import output_quantities, rate_quantities
+from inercal.selfcal.platform.states import BIAS_WALK, ENTRY_OF, KIND_OF
 
-_ROUNDS = 4
-"""Rounds of an inverse: each is nearer by a factor below 1e-3."""
+_ROUNDS = 6
+"""Rounds of an inverse: each is nearer by a factor below 1e-2."""
 
-BY_FORCE = ("G", "sag")
-"""Groups of coefficients that need the specific force."""
-
-BY_TEMPERATURE = ("kg0_T1", "ka0_T1", "ka1_T1")
-"""Groups of coefficients that need the temperature."""
+_LINEAR = 3
+"""Quantities of the rate, the first, that are in the gain of the platform."""
 
 
-def _three() -> Array:
-    """Zeros for the three axes."""
-    return np.zeros(3)
+def applied(name: str) -> bool:
+    """True for a parameter by which readings are corrected: of rates, outputs or sag; no bias that walks, which is that
+    of the last row."""
+    port = ENTRY_OF[name].port if name in ENTRY_OF else ""
+    return port in ("core", "rate", "output", "bend") and KIND_OF[name] not in BIAS_WALK
+
+
+def at_port(port: str, values: Mapping[str, float]) -> Array:
+    """Coefficients (3, quantities) at a linear port, by axis and quantity; ``values`` by parameter."""
+    coefficients = np.zeros((3, len(QUANTITIES[port])))
+    for name in filter(applied, values):
+        if (entry := ENTRY_OF[name]).port == port:
+            coefficients[entry.axis, entry.quantity] += values[name]
+    return coefficients
+
+
+def in_need(values: Mapping[str, float], quantity: str) -> str:
+    """Kinds of parameters, in words, that are not 0 and need a quantity of a record: specific force, ``f``, or
+    temperature, ``warm``."""
+    kinds = dict[str, None]()
+    for name in filter(applied, values):
+        port, _, at, _ = ENTRY_OF[name]
+        needed = QUANTITIES[port][at] if port in QUANTITIES else "f" if port == "bend" else ""
+        if values[name] != 0.0 and needed.startswith(quantity):
+            kinds[KIND_OF[name]] = None
+    return ", ".join(kinds)
 
 
 @dataclass(frozen=True)
 class RigPlatform:
-    """The linear ``platform`` and ``accelerometer``, and beside them, in SI: ``squares`` K2 and ``asymmetry`` S_asym
-    (3,), drift ``by_force`` G (3, 3), ``sag`` (3,), and per kelvin ``kg0_T1``, ``ka0_T1``, ``ka1_T1`` (3,)."""
+    """The linear ``platform`` and ``accelerometer``; beside them in SI coefficients ``rate`` (3, quantities) and
+    ``output`` (3, quantities) of `at_port`, those of the gain apart, and ``sag`` (3,); in words the kinds that need
+    specific force, ``by_force``, or temperature, ``by_temperature``."""
 
     platform: TriadModel
     accelerometer: TriadModel
-    squares: Array = field(default_factory=_three)
-    asymmetry: Array = field(default_factory=_three)
-    by_force: Array = field(default_factory=lambda: np.zeros((3, 3)))
-    sag: Array = field(default_factory=_three)
-    kg0_T1: Array = field(default_factory=_three)
-    ka0_T1: Array = field(default_factory=_three)
-    ka1_T1: Array = field(default_factory=_three)
+    rate: Array
+    output: Array
+    sag: Array
+    by_force: str = ""
+    by_temperature: str = ""
 
     @property
     def linear(self) -> bool:
-        """True if the rig adds nothing to the triads."""
-        return not self.needs(("K2", "S_asym", *BY_FORCE, *BY_TEMPERATURE))
-
-    def needs(self, groups: tuple[str, ...]) -> tuple[str, ...]:
-        """Nonzero coefficients of these groups."""
-        return tuple(group for group in groups if self._of[group].any())
-
-    @property
-    def _of(self) -> Mapping[str, Array]:
-        """Coefficients by group."""
-        return {
-            "K2": self.squares, "S_asym": self.asymmetry, "G": self.by_force, "sag": self.sag,
-            "kg0_T1": self.kg0_T1, "ka0_T1": self.ka0_T1, "ka1_T1": self.ka1_T1,
-        }  # fmt: skip
+        """True where there is nothing beside the triads."""
+        return not (self.rate[:, _LINEAR:].any() or self.output.any() or self.sag.any())
 
     def force(self, outputs: Array, warm: Array) -> Array:
         """Specific force (*batch, 3) [m/s^2] in p of accelerometer outputs; ``warm`` (*batch, 1) [K]."""
-        gain = self.accelerometer.scale
-        d = outputs - self.accelerometer.bias - self.ka0_T1 * warm
-        b, k = 1.0 + self.ka1_T1 * warm / gain, self.squares / gain
-        s = 2.0 * d / (b + np.sqrt(np.square(b) + 4.0 * k * d))
+        d = outputs - self.accelerometer.bias
+        s = d
+        for _ in range(_ROUNDS):
+            s = d - self._beside_output(s, warm)
         return self.accelerometer.correct(s + self.accelerometer.bias)
 
     def outputs(self, force: Array, warm: Array) -> Array:
         """Accelerometer outputs (*batch, 3) [m/s^2] at specific force in p: the inverse of `force`."""
-        bias, gain = self.accelerometer.bias, self.accelerometer.scale
-        s = apart(self.accelerometer.gain, force)
-        beside = self.ka1_T1 * warm * s / gain + self.squares * np.square(s) / gain
-        return s + beside + bias + self.ka0_T1 * warm
+        s = self.accelerometer.indicate(force) - self.accelerometer.bias
+        return s + self._beside_output(s, warm) + self.accelerometer.bias
 
     def turning(self, rate: Array, force: Array, warm: Array) -> Array:
         """Rate (*batch, 3) [rad/s] in p at which the platform turns, at one commanded or measured."""
-        beside = 0.5 * self.asymmetry * np.abs(rate) + self.kg0_T1 * warm + apart(self.by_force, force)
-        return self.platform.indicate(rate) + beside
+        return self.platform.indicate(rate) + self._beside_rate(rate, force, warm)
 
     def commanded(self, turning: Array, force: Array, warm: Array) -> Array:
         """Rate commanded, or measured, for the platform to turn at one: the inverse of `turning`."""
-        constant = turning - self.kg0_T1 * warm - apart(self.by_force, force)
-        rate = self.platform.correct(constant)
+        rate = self.platform.correct(turning)
         for _ in range(_ROUNDS):
-            rate = self.platform.correct(constant - 0.5 * self.asymmetry * np.abs(rate))
+            rate = self.platform.correct(turning - self._beside_rate(rate, force, warm))
         return rate
+
+    def _beside_rate(self, rate: Array, force: Array, warm: Array) -> Array:
+        """The part of the rate beside that of the triad, by the quantities in the order of the table."""
+        quantities = _plain(rate_quantities)(_axes(rate), _axes(force), warm)
+        return _total(self.rate[:, _LINEAR:], quantities[_LINEAR:])
+
+    def _beside_output(self, s: Array, warm: Array) -> Array:
+        """The part of the outputs beside ``s``, those of the triad without bias."""
+        by = s / self.accelerometer.scale
+        return _total(self.output, _plain(output_quantities)(_axes(s), _axes(by), warm))
 
     def unbent(self, v: Array, force: Array) -> Array:
         """A vector (*batch, 3) of p in the axes of the unbent platform; ``force`` (*batch, 3) [m/s^2] in p."""
@@ -110,3 +126,22 @@ class RigPlatform:
         for _ in range(_ROUNDS):
             force = self.bent(unbent, force)
         return force
+
+
+def _plain(kernel: Any) -> Any:
+    """A kernel as plain Python, which takes arrays as well."""
+    return getattr(kernel, "py_func", kernel)
+
+
+def _axes(v: Array) -> list[Array]:
+    """Components (*batch, 1) of vectors."""
+    return [v[..., i, None] for i in range(3)]
+
+
+def _total(coefficients: Array, quantities: Sequence[Array]) -> Array:
+    """Sum (*batch, 3) of coefficients (3, n) times n quantities (*batch, 1), to the same digits in any batch."""
+    total = np.zeros(3)
+    for column, quantity in zip(coefficients.T, quantities, strict=True):
+        if column.any():
+            total = total + quantity * column
+    return total

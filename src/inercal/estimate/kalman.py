@@ -54,7 +54,7 @@ def scalar_update(P: Array, x: Array, row: Row, size: int, z: float, noise: floa
     """
     places, values = row.places, row.values
     n = len(x)
-    work[:] = 0.0
+    work.fill(0.0)
     for a in range(size):
         line, value = P[places[a]], values[a]  # rows of P are its columns, and near each other
         for i in range(n):

@@ -26,7 +26,6 @@ from inercal.selfcal.filters.run import estimate, load_kernels
 from inercal.selfcal.find_base import stated_well
 from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import product_slope, to_product
-from inercal.selfcal.platform.states import ALL
 from inercal.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
@@ -245,9 +244,7 @@ def _one_run(
 
 def _truth(experiment: Experiment, problem: FilterProblem) -> Array:
     """(p,) the true values of the states, linear form."""
-    whole = np.zeros(len(ALL))
-    whole[: len(experiment.truth)] = experiment.truth
-    return np.asarray(whole[problem.states.index])
+    return np.asarray(experiment.truth[problem.states.index])
 
 
 def _joint(filtered: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:

@@ -16,10 +16,9 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import allocating, kernel
+from inercal._jit import allocating, kernel, merged
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
-from inercal.geometry.kernels import Vector
 from inercal.selfcal.filters.gaps import anew, walking
 from inercal.selfcal.filters.problem import (
     FilterModel,
@@ -32,30 +31,31 @@ from inercal.selfcal.filters.problem import (
 )
 from inercal.selfcal.platform.coefficients import product_slope, to_linear
 from inercal.selfcal.platform.kinematics import attitude
+from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.linearised import (
-    WIDEST,
-    Step,
-    accelerometer_row,
+    Transition,
     decorrelated_row,
-    empty_columns,
-    encoder_columns,
     encoder_roots,
     propagate_covariance,
+    transition,
     wander,
 )
 from inercal.selfcal.platform.model import (
+    WIDEST,
+    Base,
     Rates,
-    Truth,
-    drifting,
+    Room,
+    accelerometers,
+    base_of,
+    encoders,
     force_within,
-    on_the_base,
-    platform_rate,
-    sensing,
-    simulate_truth,
+    room,
     specific_force,
+    turning,
 )
 from inercal.selfcal.platform.plan import CommandedMotion
 from inercal.selfcal.platform.recording import Recording
+from inercal.selfcal.platform.truth import Truth, simulate_truth
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -132,10 +132,8 @@ def nominal_attitudes(motion: CommandedMotion, problem: FilterProblem, c: Array,
     first = np.array(attitude(motion.angles[0], world.axes, world.signs))
     without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
     above = np.zeros(n) if warm is None else warm
-    truth_of = Truth(q, unused, motion.angles.copy())
-    simulate_truth(
-        first, rate[:, None], np.diff(motion.t)[0], without, above, problem.states.full(c), world, truth_of
-    )
+    step, states, truth = np.diff(motion.t)[0], problem.states, Truth(q, unused, motion.angles.copy())
+    simulate_truth(first, rate[:, None], step, without, above, states.full(c), states.layout, world, truth)
     return q
 
 
@@ -235,7 +233,7 @@ def _observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) 
     gain, own = work[0], work[1]
     for s in range(len(P)):
         inner, part = r if s == 0 or s == source else 0.0, P[s]
-        own[:] = 0.0
+        own.fill(0.0)
         for k in range(size):
             line, value = part[places[k]], values[k]  # rows are columns, and near each other
             for i in range(m):
@@ -266,17 +264,16 @@ class Path(NamedTuple):
     warm: Array
 
 
-@kernel
-def arrived(path: Path, k: int, c: Array, earth: Vector, up: Vector) -> tuple[Step, Rates]:
-    """The step to row ``k`` of a path, and the rates there; ``earth`` and ``up`` are those of the encoders' frame."""
-    q, w, dt, warm = path.q[k], path.rate, path.dt[k - 1], path.warm[k]
-    at, following = (q[0], q[1], q[2], q[3]), min(k, len(w) - 1)
+@merged
+def arrived(path: Path, k: int, c: Array, base: Base, layout: Layout, own: Room) -> tuple[Transition, Rates]:
+    """The step to row ``k`` of a path, and the rates there; quantities of the rate in ``own``."""
+    w, dt, warm, following = path.rate, path.dt[k - 1], path.warm[k], min(k, len(path.rate) - 1)
+    at = (path.q[k, 0], path.q[k, 1], path.q[k, 2], path.q[k, 3])
     commanded = (w[k - 1, 0], w[k - 1, 1], w[k - 1, 2])
     read = Rates(commanded, (w[following, 0], w[following, 1], w[following, 2]))
-    rate, force = platform_rate(commanded, c), force_within(at, commanded, -0.5 * dt, up)
-    if len(c) > 24:
-        rate = drifting(rate, force, warm, c)
-    return Step(commanded, rate, earth, at, dt, force, warm), read
+    f = force_within(at, commanded, -0.5 * dt, base.up, layout.by_force)
+    rate = turning(commanded, f, warm, c, layout, own)
+    return transition(commanded, rate, dt, at, base.earth, c, layout.based), read
 
 
 @allocating
@@ -289,44 +286,43 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
     q, th, seen, warm = path.q, path.th, path.measured, path.warm
     world, noise, gate, layout = model
     m, place = P.shape[1], layout.place
-    top, work, row, columns = np.empty((3, m)), np.empty((2, m)), empty_row(WIDEST), empty_columns()
+    top, spare, work, row, own = (
+        np.empty((3, m)),
+        np.empty((3, m)),
+        np.empty((2, m)),
+        empty_row(WIDEST),
+        room(),
+    )
     near = np.zeros(3, dtype=np.int64)
-    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
+    base, mean = base_of(c, layout.based, world), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(len(q)):
         if k > 0:
-            step, read = arrived(path, k, c, earth_e, up_e)
-            at = step.attitude
-            walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
+            F, read = arrived(path, k, c, base, layout, own)
+            at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+            walk = noise.angle_random_walk * noise.angle_random_walk * F.dt
             for s in range(len(P)):
-                propagate_covariance(P[s], c, place, step, walk if s < 2 else 0.0, top, columns)
-                if len(c) > 24:  # how far biases walk is known before, as a prior is
+                propagate_covariance(P[s], F, layout, own, walk if s < 2 else 0.0, top, spare)
+                if layout.walking:  # how far biases walk is known before, as a prior is
                     known = 1.0 if s == 0 or s == 4 else 0.0
                     of_gyros, of_accelerometers = known * noise.gyro_walk, known * noise.accelerometer_walk
-                    wander(P[s], mean, place, of_gyros, of_accelerometers, step.dt)
+                    wander(P[s], mean, place, of_gyros, of_accelerometers, F.dt)
             if seen[k, 3]:
-                watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
+                watch(specific_force(attitude(th[k], world.axes, world.signs), base.up), gate, near)
             if updating(gate, near):
                 if seen[k, 3]:
-                    roots, _ = encoder_roots(
-                        th[k],
-                        world.axes,
-                        world.signs,
-                        noise.encoder,
-                        noise.joints,
-                        apart(noise, step.dt, noise.encoder),
-                    )
-                    wide = encoder_columns(
-                        th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
-                    )
+                    sigma = noise.encoder
+                    floor = apart(noise, F.dt, sigma)
+                    roots, _ = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
+                    encoders(th[k], read, base, c, layout, world, own)
                     for i in range(3):
-                        size = decorrelated_row(i, roots[i], columns, wide, row)
+                        size = decorrelated_row(i, roots[i], layout.columns, own.axes, row)
                         _observe(P, row, size, 1.0, _PARTS[1], work)
-                sensed = sensing(at, read, earth_e, up_e, warm[k], c)
+                accelerometers(at, read, warm[k], base, c, layout, own)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        size = accelerometer_row(i, sensed, c, place, up_e, row)
-                        _observe(P, row, size, variance, _PARTS[0], work)
+                        of_row = Row(layout.rows[i], own.entries[i])
+                        _observe(P, of_row, layout.sizes[i], variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(u.shape[1]):
                 u[k, i] = math.sqrt(P[0, 3 + i, 3 + i])

@@ -20,7 +20,6 @@ import numpy as np
 from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row
-from inercal.geometry.kernels import exp, right_jacobian, rotate
 from inercal.selfcal.before.bounds import Path, arrived
 from inercal.selfcal.filters.gaps import anew
 from inercal.selfcal.filters.problem import (
@@ -35,27 +34,25 @@ from inercal.selfcal.filters.problem import (
 from inercal.selfcal.platform.kinematics import attitude
 from inercal.selfcal.platform.linearised import (
     WALK_TIME,
-    WIDEST,
-    Columns,
     Places,
-    Step,
-    accelerometer_row,
+    add_unknown,
     decorrelated_row,
-    dynamics_columns,
-    empty_columns,
-    encoder_columns,
     encoder_roots,
     encoder_row,
     propagate_covariance,
+    times,
     wander,
 )
 from inercal.selfcal.platform.model import (
-    on_the_base,
-    sensing,
+    WIDEST,
+    accelerometers,
+    base_of,
+    encoders,
+    room,
     specific_force,
 )
 from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import ALL, WALK
+from inercal.selfcal.platform.states import WALK
 
 
 def sensitivities(
@@ -122,9 +119,6 @@ def _carried(
     `carry`."""
     p, m = len(coefficients), len(names)
     states = problem.states
-    place = np.full(len(ALL), -1, dtype=np.int64)
-    place[states.index] = 3 + np.arange(p)
-    place[[ALL.index(name) for name in names]] = 3 + p + np.arange(m)
     full = states.stated.copy()
     full[states.index] = coefficients
     whole = replace(states, names=(*states.names, *names))
@@ -134,9 +128,7 @@ def _carried(
     q, th, dt, rate = attitudes, recording.th, recording.dt, recording.rate
     warm = np.zeros(len(q)) if recording.warm is None else recording.warm
     first = 0
-    model = problem.model._replace(
-        layout=whole.layout._replace(chosen=states.index, place=place, stated=full)
-    )
+    model = problem.model._replace(layout=whole.layout)
     for last in (*restarts, len(q)):
         _on_encoders(P, S, wide, th[first], full[wide.states.index], rate[min(first, len(rate) - 1)])
         rows, steps = slice(first, last), slice(first, max(last - 1, 0))
@@ -170,53 +162,47 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
     m), or none, receive those of the normalised innovations."""
     q, th, measured, warm = path.q, path.th, path.measured, path.warm
     world, noise, gate, layout = model
-    n, place = len(P), layout.place
-    own = place.copy()
-    for i in range(len(own)):
-        if own[i] >= n:
-            own[i] = -1
-    top, gain, row, columns = np.empty((3, n)), np.empty(n), empty_row(WIDEST), empty_columns()
-    shift, near = np.empty((3, S.shape[1])), np.zeros(3, dtype=np.int64)
-    earth_e, up_e, mean = on_the_base(world.earth, c), on_the_base(world.up, c), c.copy()
+    n, m, place = len(P), S.shape[1], layout.place
+    top, spare, gain, row, own = np.empty((3, n)), np.empty((3, n)), np.empty(n), empty_row(WIDEST), room()
+    shift, used, near = np.empty((3, m)), np.empty((3, m)), np.zeros(3, dtype=np.int64)
+    base, mean = base_of(c, layout.based, world), c.copy()
     variance = noise.accelerometer * noise.accelerometer
     for k in range(1, len(q)):
-        step, read = arrived(path, k, c, earth_e, up_e)
-        at = step.attitude
-        _carry_step(S, n, c, place, step, shift, columns)
-        walk = noise.angle_random_walk * noise.angle_random_walk * step.dt
-        propagate_covariance(P, c, own, step, walk, top, columns)
-        wander(P, mean, own, noise.gyro_walk, noise.accelerometer_walk, step.dt)
-        _forget(S, own, step.dt)
+        F, read = arrived(path, k, c, base, layout, own)
+        at = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
+        times(F, S, layout, own, shift, used)
+        add_unknown(F, n, layout, own, shift)
+        for i in range(3):
+            for j in range(m):
+                S[i, j] = shift[i, j]
+        walk = noise.angle_random_walk * noise.angle_random_walk * F.dt
+        propagate_covariance(P, F, layout, own, walk, top, spare)
+        if layout.walking:
+            wander(P, mean, place, noise.gyro_walk, noise.accelerometer_walk, F.dt)
+            _forget(S, place, F.dt)
         if measured[k, 3]:
-            watch(specific_force(attitude(th[k], world.axes, world.signs), up_e), gate, near)
+            watch(specific_force(attitude(th[k], world.axes, world.signs), base.up), gate, near)
         if updating(gate, near):
             if measured[k, 3]:
-                roots, variances = encoder_roots(
-                    th[k],
-                    world.axes,
-                    world.signs,
-                    noise.encoder,
-                    noise.joints,
-                    apart(noise, step.dt, noise.encoder),
-                )
-                wide = encoder_columns(
-                    th[k], at, read, earth_e, up_e, c, layout, world.axes, world.signs, columns
-                )
+                sigma = noise.encoder
+                floor = apart(noise, F.dt, sigma)
+                roots, variances = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
+                encoders(th[k], read, base, c, layout, world, own)
                 for i in range(3 if len(slopes) > 0 else 0):
-                    size = encoder_row(i, columns, wide, row)
+                    size = encoder_row(i, layout.columns, own.axes, row)
                     _shown(P, S, row, size, variances[i], slopes[k, 3 + i])
                 for i in range(3):
-                    size = decorrelated_row(i, roots[i], columns, wide, row)
+                    size = decorrelated_row(i, roots[i], layout.columns, own.axes, row)
                     _update(P, S, row, size, 1.0, gain, shift[0])
-            sensed = sensing(at, read, earth_e, up_e, warm[k], c)
+            accelerometers(at, read, warm[k], base, c, layout, own)
             for i in range(3 if len(slopes) > 0 else 0):
                 if measured[k, i] and admitted(i, gate, near):
-                    size = accelerometer_row(i, sensed, c, place, up_e, row)
-                    _shown(P, S, row, size, variance, slopes[k, i])
+                    of_row = Row(layout.rows[i], own.entries[i])
+                    _shown(P, S, of_row, layout.sizes[i], variance, slopes[k, i])
             for i in range(3):
                 if measured[k, i] and admitted(i, gate, near):
-                    size = accelerometer_row(i, sensed, c, place, up_e, row)
-                    _update(P, S, row, size, variance, gain, shift[0])
+                    of_row = Row(layout.rows[i], own.entries[i])
+                    _update(P, S, of_row, layout.sizes[i], variance, gain, shift[0])
 
 
 @kernel
@@ -224,38 +210,9 @@ def _forget(S: Array, place: Places, dt: float) -> None:
     """Let what errors of walking biases depend on fade within ``dt`` [s], as these do, in sensitivities ``S``."""
     keep = math.exp(-dt / WALK_TIME)
     for i in range(WALK, WALK + 6):
-        if place[i] >= 0:
+        if 0 <= place[i] < len(S):
             for k in range(S.shape[1]):
                 S[place[i], k] *= keep
-
-
-@kernel
-def _carry_step(
-    S: Array, n: int, c: Array, place: Places, step: Step, shift: Array, columns: Columns
-) -> None:
-    """Sensitivities after a step; ``shift`` (3, m) and ``columns`` are used up."""
-    w, rate, dt, m = step.commanded, step.rate, step.dt, S.shape[1]
-    j = right_jacobian((rate[0] * dt, rate[1] * dt, rate[2] * dt))
-    back = exp((-rate[0] * dt, -rate[1] * dt, -rate[2] * dt))
-    count = dynamics_columns(c, place, step, columns)
-    for k in range(m):
-        v = rotate(back, (S[0, k], S[1, k], S[2, k]))
-        x = S[3, k] + w[1] * S[9, k] - w[2] * S[12, k]
-        y = S[4, k] + w[2] * S[10, k] - w[0] * S[13, k]
-        z = S[5, k] + w[0] * S[11, k] - w[1] * S[14, k]
-        for i in range(3):
-            shift[i, k] = v[i] + dt * (j[i][0] * x + j[i][1] * y + j[i][2] * z)
-    for a in range(count):
-        at = columns.places[a]
-        for i in range(3):
-            if at >= n:
-                shift[i, at - n] += columns.axes[a, i]
-            else:
-                for k in range(m):
-                    shift[i, k] += columns.axes[a, i] * S[at, k]
-    for i in range(3):
-        for k in range(m):
-            S[i, k] = shift[i, k]
 
 
 @kernel
@@ -275,7 +232,7 @@ def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> N
 @kernel
 def _seen(S: Array, row: Row, size: int, n: int, out: Array) -> None:
     """Put into ``out`` (m,) what a ``row`` sees of each error: ``S`` (n, m) of the error state, and of itself."""
-    out[:] = 0.0
+    out.fill(0.0)
     for a in range(size):
         at, value = row.places[a], row.values[a]
         if at < n:
@@ -292,7 +249,7 @@ def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array, shif
     places, values = row.places, row.values
     n, m = S.shape
     variance = r
-    gain[:] = 0.0
+    gain.fill(0.0)
     for a in range(size):
         if places[a] < n:
             line, value = P[places[a]], values[a]  # rows are columns, and near each other

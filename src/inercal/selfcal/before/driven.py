@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply
+from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.model import (
-    drifting,
+    base_of,
+    bending,
+    chain,
     force_within,
-    joints_attitude,
-    on_the_base,
-    platform_rate,
+    joint_angles,
     propagate,
-    rig_accelerometers,
-    sagging,
+    room,
+    sensed,
     specific_force,
+    turning,
 )
 from inercal.selfcal.platform.rig import World
 from inercal.selfcal.platform.states import TAU
@@ -32,36 +34,43 @@ class Driven(NamedTuple):
     th: Array
 
 
-@kernel
+@allocating
 def drive(
-    angles: Array, sway: Array, dt: float, noise: Array, warm: Array, c: Array, world: World, out: Driven
+    angles: Array,
+    sway: Array,
+    dt: float,
+    noise: Array,
+    warm: Array,
+    c: Array,
+    layout: Layout,
+    world: World,
+    out: Driven,
 ) -> None:
     """Turn the joints through ``angles`` (n, 3) [rad] that their encoders would read at once, rows every ``dt`` [s].
 
     ``sway`` (n, 3) [rad] of the base; ``noise`` (n - 1, 3) [rad/s] of the gyros; ``warm`` (n,) [K] above the
-    temperature of the coefficients; ``c`` (K,) full vector, linear form.
+    temperature of the coefficients; ``c`` (K,) full vector, linear form, what of it is not 0 in the ``layout``.
     """
     q, rate, acc, th = out
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
-    n = len(q)
+    n, own, base = len(q), room(), base_of(c, layout.based, world)
     for k in range(n):
-        at = joints_attitude((angles[k, 0], angles[k, 1], angles[k, 2]), c, world.axes, world.signs)
-        at = multiply(exp((sway[k, 0], sway[k, 1], sway[k, 2])), at)
-        bent = sagging(at, up_e, c)
-        at = multiply(at, exp(bent))
+        joint_angles(angles[k], c, layout, own)
+        back = chain(c, layout, world, own)
+        at = multiply(exp((sway[k, 0], sway[k, 1], sway[k, 2])), (back[0], -back[1], -back[2], -back[3]))
+        at = multiply(at, bending(specific_force(at, base.up), c))
         for i in range(4):
             q[k, i] = at[i]
     for k in range(n - 1):
         here = (q[k, 0], q[k, 1], q[k, 2], q[k, 3])
-        true = _gained(here, (q[k + 1, 0], q[k + 1, 1], q[k + 1, 2], q[k + 1, 3]), earth_e, dt)
-        f = force_within(here, true, 0.5 * dt, up_e)
+        true = _gained(here, (q[k + 1, 0], q[k + 1, 1], q[k + 1, 2], q[k + 1, 3]), base.earth, dt)
+        f = force_within(here, true, 0.5 * dt, base.up, layout.by_force)
         read = true
         for _ in range(8):  # each round is nearer by a misalignment
-            back = drifting(platform_rate(read, c), f, warm[k], c)
+            made = turning(read, f, warm[k], c, layout, own)
             read = (
-                read[0] + true[0] - back[0] - noise[k, 0],
-                read[1] + true[1] - back[1] - noise[k, 1],
-                read[2] + true[2] - back[2] - noise[k, 2],
+                read[0] + true[0] - made[0] - noise[k, 0],
+                read[1] + true[1] - made[1] - noise[k, 1],
+                read[2] + true[2] - made[2] - noise[k, 2],
             )
         for i in range(3):
             rate[k, i] = read[i]
@@ -72,14 +81,14 @@ def drive(
         w = _gained(
             (q[j, 0], q[j, 1], q[j, 2], q[j, 3]),
             (q[j + 1, 0], q[j + 1, 1], q[j + 1, 2], q[j + 1, 3]),
-            earth_e,
+            base.earth,
             dt,
         )
-        then = propagate(here, w, earth_e, -c[TAU + 1])
-        read = rig_accelerometers(specific_force(then, up_e), w, warm[k], c)
+        then = propagate(here, w, base.earth, -c[TAU + 1])
+        outputs, _ = sensed(then, w, w, warm[k], base, c, layout, own)
         j = max(k - 1, 0) if c[TAU] >= 0.0 else min(k, n - 2)
         for i in range(3):
-            acc[k, i] = read[i]
+            acc[k, i] = outputs[i]
             th[k, i] = angles[k, i] - c[TAU] * (angles[j + 1, i] - angles[j, i]) / dt
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,12 @@ from inercal.selfcal.limits import LIMITS
 from inercal.selfcal.platform.coefficients import to_linear
 from inercal.selfcal.platform.joint_limits import beyond
 from inercal.selfcal.platform.kinematics import all_angles, attitude
-from inercal.selfcal.platform.model import Truth, simulate_truth
+from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.plan import CommandedMotion, motion
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import ALL
+from inercal.selfcal.platform.states import StateVector
+from inercal.selfcal.platform.truth import Truth, simulate_truth
 from inercal.selfcal.settings import Disturbances, Noise, SelfcalSettings
 from inercal.units import parse_unit
 
@@ -29,7 +31,7 @@ from inercal.units import parse_unit
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """A plan on a rig, ready to be simulated many times: ``motion`` as commanded; ``fine`` (n - 1, m, 3) [rad/s] the
-    rates on which the platform acts in each finer step; ``truth`` (24 or K,) full vector in the linear form; ``warm``
+    rates on which the platform acts in each finer step; ``truth`` (K,) full vector in the linear form; ``warm``
     (n,) [K] above the temperature of the coefficients, None where that is constant. Where joints are ``fixed``, motors
     drive the others, and the gyros measure."""
 
@@ -41,6 +43,11 @@ class Experiment:
     disturbances: Disturbances
     warm: Array | None = None
     fixed: tuple[int, ...] = ()
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The layout of a truth, for kernels."""
+        return StateVector((), self.truth).layout
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +64,8 @@ def experiment(settings: SelfcalSettings) -> Experiment:
     limits of the joints."""
     if settings.plan is None:
         raise StudyError("plan", "missing, expected the turns to be simulated")
-    if settings.truth is None:
+    truth = settings.true_values
+    if truth is None:
         raise StudyError("truth", "missing, expected the true coefficients")
     if too_far := settings.plan.beyond(settings.limits):
         low, high = (math.degrees(end) for end in settings.limits[too_far[0]])
@@ -68,15 +76,11 @@ def experiment(settings: SelfcalSettings) -> Experiment:
             "plan", f"found {others[0]} beyond the limits of the rig, expected turns within them"
         )
     commanded = motion(settings.plan, settings.world)
-    other, truth = settings.disturbances, settings.truth
-    if settings.unread:
-        truth = np.append(truth, np.zeros(len(ALL) - len(truth)))
-        if other.command_delay > 0.0 or other.servo_jitter > 0.0:
-            name = "command_delay" if other.command_delay > 0.0 else "servo_jitter"
-            text = "found it of a rig with fixed joints, whose platform nobody commands, expected none"
-            raise StudyError(f"disturbances.{name}", text)
-    elif not truth[24:].any():
-        truth = truth[:24]
+    other = settings.disturbances
+    if settings.unread and (other.command_delay > 0.0 or other.servo_jitter > 0.0):
+        name = "command_delay" if other.command_delay > 0.0 else "servo_jitter"
+        text = "found it of a rig with fixed joints, whose platform nobody commands, expected none"
+        raise StudyError(f"disturbances.{name}", text)
     fine = _acting(commanded, other.substeps, other.command_delay)
     temperature = settings.simulated_temperature(len(commanded.t))
     warm = None if temperature is None else settings.warm(temperature)
@@ -158,9 +162,11 @@ def _commanded(experiment: Experiment, rng: np.random.Generator) -> tuple[Array,
     q0 = np.array(attitude(commanded.angles[0], world.axes, world.signs))
     read = commanded.angles.copy()
     warm = np.zeros(n) if experiment.warm is None else experiment.warm
-    simulate_truth(q0, fine, dt, wander, warm, experiment.truth, world, Truth(q, acc, read))
+    simulate_truth(
+        q0, fine, dt, wander, warm, experiment.truth, experiment.layout, world, Truth(q, acc, read)
+    )
     all_angles(q, commanded.angles[0], world.axes, world.signs, th)
-    return rate, q, acc, read if len(experiment.truth) > 24 else th.copy(), th
+    return rate, q, acc, read if experiment.layout.read_off else th.copy(), th
 
 
 def _driven(experiment: Experiment, rng: np.random.Generator) -> tuple[Array, ...]:
@@ -172,7 +178,7 @@ def _driven(experiment: Experiment, rng: np.random.Generator) -> tuple[Array, ..
     sway = _swaying(experiment, rng) if experiment.disturbances.base_sway[0] > 0.0 else np.zeros((n, 3))
     warm = np.zeros(n) if experiment.warm is None else experiment.warm
     out = Driven(np.empty((n, 4)), np.empty((n - 1, 3)), np.empty((n, 3)), np.empty((n, 3)))
-    drive(angles, sway, dt, wander, warm, experiment.truth, experiment.world, out)
+    drive(angles, sway, dt, wander, warm, experiment.truth, experiment.layout, experiment.world, out)
     return out.rate, out.q, out.acc, out.th, angles
 
 

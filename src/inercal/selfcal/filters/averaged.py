@@ -19,28 +19,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import allocating, kernel
+from inercal._jit import allocating, merged
 from inercal.arrays import Array
-from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply
+from inercal.geometry.kernels import Quaternion, exp, log, multiply
 from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.filters.gaps import doubtful
 from inercal.selfcal.filters.problem import FilterProblem
 from inercal.selfcal.filters.residuals import gimbals
 from inercal.selfcal.limits import LIMITS
+from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.model import (
+    Base,
     Rates,
-    drifting,
-    encoders_attitude,
+    Room,
+    accelerometers,
+    base_of,
+    encoders,
     force_within,
-    on_the_base,
-    outputs,
-    platform_rate,
     propagate,
-    sensing,
+    room,
+    turning,
 )
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import Layout
 
 
 def averaged(
@@ -156,7 +157,7 @@ def _average(
 ) -> None:
     """Means over blocks of ``m`` rows about their ``middle`` ones; ``q`` (n, 4) attitudes, ``c`` the full vector."""
     t, rate = rows.t, rows.rate
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
+    own, base = room(), base_of(c, layout.based, world)
     for b in range(len(middle)):
         r = middle[b]
         if b + 1 < len(middle):
@@ -170,12 +171,12 @@ def _average(
         begin = b * m
         at = (q[r, 0], q[r, 1], q[r, 2], q[r, 3])
         for k in range(r, begin, -1):
-            at = _moved(at, rows, k - 1, -1.0, earth_e, up_e, c)
+            at = _moved(at, rows, k - 1, -1.0, base, c, layout, own)
         angles, force, read, sensed = np.zeros(3), np.zeros(3), 0, np.zeros(3)
         here, shown = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for k in range(begin, begin + m):
             if k > begin:
-                at = _moved(at, rows, k - 1, 1.0, earth_e, up_e, c)
+                at = _moved(at, rows, k - 1, 1.0, base, c, layout, own)
             before, after = max(k - 1, 0), min(k, len(rate) - 1)
             of = Rates(
                 (rate[before, 0], rate[before, 1], rate[before, 2]),
@@ -183,14 +184,14 @@ def _average(
             )
             th = rows.th[k]
             if not (math.isnan(th[0]) or math.isnan(th[1]) or math.isnan(th[2])):
-                to = encoders_attitude(th, of, earth_e, up_e, c, layout, world.axes, world.signs)
+                to = encoders(th, of, base, c, layout, world, own)
                 miss = log(multiply((at[0], -at[1], -at[2], -at[3]), to))
                 read += 1
                 for i in range(3):
                     angles[i] += miss[i]
                 if k == r:
                     here = miss
-            expected = outputs(sensing(at, of, earth_e, up_e, rows.warm[k], c), c)
+            expected, _ = accelerometers(at, of, rows.warm[k], base, c, layout, own)
             if k == r:
                 shown = expected
             for i in range(3):
@@ -202,16 +203,14 @@ def _average(
             out.acc[b, i] = shown[i] + force[i] / sensed[i] if 2.0 * sensed[i] > m else math.nan
 
 
-@kernel
+@merged
 def _moved(
-    q: Quaternion, rows: _Rows, step: int, way: float, earth: Vector, up: Vector, c: Array
+    q: Quaternion, rows: _Rows, step: int, way: float, base: Base, c: Array, layout: Layout, own: Room
 ) -> Quaternion:
     """The attitude after a step, or before it where ``way`` is -1."""
     w, dt = (
         (rows.rate[step, 0], rows.rate[step, 1], rows.rate[step, 2]),
         way * (rows.t[step + 1] - rows.t[step]),
     )
-    turning = platform_rate(w, c)
-    if len(c) > 24:
-        turning = drifting(turning, force_within(q, w, 0.5 * dt, up), rows.warm[step], c)
-    return propagate(q, turning, earth, dt)
+    f = force_within(q, w, 0.5 * dt, base.up, layout.by_force)
+    return propagate(q, turning(w, f, rows.warm[step], c, layout, own), base.earth, dt)

@@ -31,7 +31,6 @@ from inercal.geometry.rotations import (
     inverse_left_jacobian,
     multiply,
     normalize,
-    right_jacobian,
     to_matrix,
 )
 from inercal.selfcal.filters.filter_result import FilterResult
@@ -44,12 +43,11 @@ from inercal.selfcal.filters.residuals import (
     first_reading,
     followed,
     normalised,
-    on_base,
     readings,
     sensed,
     turns,
-    turns_on_rig,
 )
+from inercal.selfcal.platform.model import base_of
 from inercal.selfcal.platform.recording import Recording
 from inercal.selfcal.platform.states import TAU
 
@@ -152,22 +150,14 @@ def _terms_at(
 ) -> _Terms:
     """All terms at attitudes (n, 4) and coefficients (p,); ``loose`` steps weigh next to nothing; ``of_encoders``: the
     start is that of the first reading, whose errors are those of the states."""
-    world, prior, dt = problem.world, problem.prior, recording.dt
-    of_rows = sensed(q[1:], c, measured, problem)
-    rig, by_start = problem.states.of_rig, np.zeros((3, len(c)))
-    base = on_base(problem.states.full(c)[:24], world)
-    if rig:
-        turn, slope = turns_on_rig(q[1:], recording.steps, c, problem)
-        if of_encoders:
-            start, by_start = _at_encoders(recording, problem, c, start)
-    else:
-        turn, slope = turns(recording.rate, dt, c)
-    ahead, of_earth = exp(turn), -dt[:, None] * base.earth
-    propagated = multiply(multiply(exp(of_earth), q[:-1]), ahead)
-    if base.earth_slope is not None and not rig:
-        # qexp(-(w + d) dt) = qexp(-Jl d dt) qexp(-w dt), which turns the propagated attitude from the left
-        by_earth = -dt[:, None, None] * right_jacobian(-of_earth) @ base.earth_slope
-        slope[:, :, -3:] += np.swapaxes(to_matrix(propagated), 1, 2) @ by_earth
+    prior, dt, states = problem.prior, recording.dt, problem.states
+    of_rows, by_start = sensed(q[1:], c, measured, problem), np.zeros((3, len(c)))
+    earth = np.array(base_of(states.full(c), states.layout.based, problem.world).earth)
+    turn, slope = turns(q[:-1], recording.steps, c, problem)
+    if of_encoders:
+        start, by_start = _at_encoders(recording, problem, c, start)
+    ahead = exp(turn)
+    propagated = multiply(multiply(exp(-dt[:, None] * earth), q[:-1]), ahead)
     residual = boxminus(q[1:], propagated)
     weight = 1.0 / (problem.noise.angle_random_walk * np.sqrt(recording.walking))
     weight[list(loose)] = 1.0 / np.pi

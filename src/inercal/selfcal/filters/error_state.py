@@ -14,7 +14,7 @@ import numpy as np
 from inercal._jit import allocating, kernel
 from inercal.arrays import Array
 from inercal.estimate.kalman import Row, empty_row, innovation_variance, scalar_update
-from inercal.geometry.kernels import Quaternion, exp, log, multiply, normalize
+from inercal.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.selfcal.filters.problem import (
     FilterModel,
@@ -26,32 +26,28 @@ from inercal.selfcal.filters.problem import (
     updating,
     watch,
 )
-from inercal.selfcal.platform.kinematics import Axes, nearest_turn
+from inercal.selfcal.platform.kinematics import nearest_turn
 from inercal.selfcal.platform.linearised import (
-    WIDEST,
-    Columns,
     Places,
-    Step,
-    accelerometer_row,
     decorrelated_row,
-    empty_columns,
-    encoder_columns,
     encoder_roots,
     encoder_row,
     propagate_covariance,
+    transition,
     wander,
 )
 from inercal.selfcal.platform.model import (
+    WIDEST,
     Rates,
-    drifting,
-    encoders_attitude,
+    Vectors,
+    accelerometers,
+    base_of,
+    encoders,
     force_within,
-    on_the_base,
-    outputs,
-    platform_rate,
     propagate,
-    sensing,
+    room,
     specific_force,
+    turning,
 )
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.states import LEVER, TAU
@@ -107,7 +103,7 @@ def _corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
     for j in range(len(index)):
         c[index[j]] += x[3 + j]
     turned = normalize(multiply(q, exp((x[0], x[1], x[2]))))
-    x[:] = 0.0
+    x.fill(0.0)
     return turned
 
 
@@ -147,35 +143,30 @@ def _shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
 def _encoder_update(
     q: Quaternion,
     of_encoders: Quaternion,
-    angles: Array,
-    axes: Axes,
-    signs: Array,
-    sigma: float,
-    joints: Array,
-    floor: float,
+    roots: Vectors,
+    variances: Vector,
     P: Array,
     x: Array,
-    columns: Columns,
-    count: int,
+    columns: Places,
+    axes: Array,
     row: Row,
     work: Array,
     innovations: Array,
 ) -> float:
-    """Put encoders of noise ``sigma`` [rad] into covariance ``P`` and error state ``x``; returns the sum of squares.
+    """Put encoders into covariance ``P`` and error state ``x``; returns the sum of squares.
 
-    ``joints`` and ``floor`` as of `encoder_roots`; ``of_encoders`` (4,) the attitude that they have, with ``count``
-    columns of states; ``innovations`` (3,) are written, or (0,).
+    ``of_encoders`` (4,) is the attitude that they have, with ``axes`` of states at the places ``columns`` (m,);
+    ``roots`` and ``variances`` as of `encoder_roots`; ``innovations`` (3,) are written, or (0,).
     """
-    roots, variances = encoder_roots(angles, axes, signs, sigma, joints, floor)
     miss = log(multiply((q[0], -q[1], -q[2], -q[3]), of_encoders))
     if len(innovations) > 0:
         for i in range(3):
-            size = encoder_row(i, columns, count, row)
+            size = encoder_row(i, columns, axes, row)
             innovations[i] = miss[i] / math.sqrt(innovation_variance(P, row, size, variances[i]))
     total = 0.0
     for i in range(3):
         root = roots[i]
-        size = decorrelated_row(i, root, columns, count, row)
+        size = decorrelated_row(i, root, columns, axes, row)
         z = root[0] * miss[0] + root[1] * miss[1] + root[2] * miss[2]
         total += scalar_update(P, x, row, size, z, 1.0, work)
     return total
@@ -187,31 +178,30 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rates, acc, th, later, warm = steps
-    index, place, axes, signs = layout.chosen, layout.place, world.axes, world.signs
+    index, place = layout.chosen, layout.place
     c = layout.stated.copy()
     for j in range(len(index)):
         c[index[j]] = estimated[j]
     n = len(P)
-    top, x, work = np.empty((3, n)), np.zeros(n), np.empty(n)
-    row, columns = empty_row(WIDEST), empty_columns()
+    top, spare, x, work = np.empty((3, n)), np.empty((3, n)), np.zeros(n), np.empty(n)
+    row, own = empty_row(WIDEST), room()
     variance = noise.accelerometer * noise.accelerometer
-    history, rig = len(out.u) > 0, len(c) > 24
+    history = len(out.u) > 0
     late = place[TAU] >= 0 or place[TAU + 1] >= 0
-    levers, unwanted = rig and place[LEVER] >= 0, np.empty(0)
+    levers, unwanted = place[LEVER] >= 0, np.empty(0)
     cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
+    base = base_of(c, layout.based, world)
     for k in range(len(intervals)):
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
         read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
-        rate, earth_e, up_e = platform_rate(w, c), on_the_base(world.earth, c), on_the_base(world.up, c)
-        f = (0.0, 0.0, 0.0)
-        if rig:
-            f = force_within(q, w, 0.5 * dt, up_e)
-            rate = drifting(rate, f, warm[k], c)
-        q = normalize(propagate(q, rate, earth_e, dt))
+        f = force_within(q, w, 0.5 * dt, base.up, layout.by_force)
+        rate = turning(w, f, warm[k], c, layout, own)
+        q = normalize(propagate(q, rate, base.earth, dt))
         walk = noise.angle_random_walk * noise.angle_random_walk * dt
-        propagate_covariance(P, c, place, Step(w, rate, earth_e, q, dt, f, warm[k]), walk, top, columns)
-        if rig:
+        F = transition(w, rate, dt, q, base.earth, c, layout.based)
+        propagate_covariance(P, F, layout, own, walk, top, spare)
+        if layout.walking:
             wander(P, c, place, noise.gyro_walk, noise.accelerometer_walk, dt)
         total, count = 0.0, 0
         seen = not (math.isnan(th[k, 0]) or math.isnan(th[k, 1]) or math.isnan(th[k, 2]))
@@ -219,48 +209,27 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
             for i in range(3):
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
-            of_encoders = encoders_attitude(angles, read, earth_e, up_e, c, layout, axes, signs)
-            watch(specific_force(of_encoders, up_e), gate, near)
+            of_encoders = encoders(angles, read, base, c, layout, world, own)
+            watch(specific_force(of_encoders, base.up), gate, near)
         take = updating(gate, near)
         if history:
             for i in range(6):
                 out.innovations[k, i] = math.nan
         if take and seen:
-            wide = 0
-            if rig:
-                wide = encoder_columns(
-                    angles, of_encoders, read, earth_e, up_e, c, layout, axes, signs, columns
-                )
             if late:
                 sigma = math.sqrt(noise.encoder * noise.encoder + _undecided(P, c, place, 0, read))
             shown = out.innovations[k, 3:] if history else unwanted
+            floor = apart(noise, dt, sigma)
+            roots, variances = encoder_roots(angles, world.axes, world.signs, sigma, noise.joints, floor)
             total += _encoder_update(
-                q,
-                of_encoders,
-                angles,
-                axes,
-                signs,
-                sigma,
-                noise.joints,
-                apart(noise, dt, sigma),
-                P,
-                x,
-                columns,
-                wide,
-                row,
-                work,
-                shown,
+                q, of_encoders, roots, variances, P, x, layout.columns, own.axes, row, work, shown
             )
             count += 3
             q = _corrected(q, c, index, x)
+            base = base_of(c, layout.based, world)
         if take:
-            up_e = on_the_base(world.up, c)
-            if rig:
-                earth_e = on_the_base(world.earth, c)
-            sensed = sensing(q, read, earth_e, up_e, warm[k], c)
-            expected = outputs(sensed, c)
+            expected, a = accelerometers(q, read, warm[k], base, c, layout, own)
             if late:
-                a = sensed.force
                 of_acc = variance + _undecided(P, c, place, 1, read) * (
                     a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
                 )
@@ -268,15 +237,17 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 of_acc = (of_acc if late else variance) + _shaken(P, c, place, read, dt)
             for i in range(3):
                 if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    size = accelerometer_row(i, sensed, c, place, up_e, row)
-                    own = innovation_variance(P, row, size, of_acc)
-                    out.innovations[k, i] = (acc[k, i] - expected[i]) / math.sqrt(own)
+                    of_row = Row(layout.rows[i], own.entries[i])
+                    spread = innovation_variance(P, of_row, layout.sizes[i], of_acc)
+                    out.innovations[k, i] = (acc[k, i] - expected[i]) / math.sqrt(spread)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    size = accelerometer_row(i, sensed, c, place, up_e, row)
-                    total += scalar_update(P, x, row, size, acc[k, i] - expected[i], of_acc, work)
+                    of_row = Row(layout.rows[i], own.entries[i])
+                    z = acc[k, i] - expected[i]
+                    total += scalar_update(P, x, of_row, layout.sizes[i], z, of_acc, work)
                     count += 1
             q = _corrected(q, c, index, x)
+            base = base_of(c, layout.based, world)
         out.nis[k] = total if count > 0 else math.nan
         out.dims[k] = count
         if history:

@@ -27,9 +27,10 @@ from inercal.estimate.sigma_point import draw, empty_moments, empty_points, mome
 from inercal.geometry.kernels import Vector
 from inercal.selfcal.estimators import FACTOR_OF
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import Axes, angles, attitude, nearest_turn, parity
-from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.platform.model import specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
 
@@ -149,7 +150,14 @@ class GimbalStep(NamedTuple):
 
 @kernel
 def _predict(
-    th: Array, c: Array, turn: GimbalStep, world: World, columns: Array, shifted: Array, z: Array
+    th: Array,
+    c: Array,
+    extended: bool,
+    turn: GimbalStep,
+    world: World,
+    columns: Array,
+    shifted: Array,
+    z: Array,
 ) -> None:
     """Put into ``z`` (2 n + 1, 3) the angles of all points after a step, against ``th``; ``columns`` (n, n) are those
     of the points before; ``shifted`` (p,) is used up."""
@@ -158,12 +166,13 @@ def _predict(
     at, earth_k = cosines(hat(th, e, signs)), along(world.earth, axes, e)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
-        for j in range(len(c)):
+        for j in range(len(shifted)):
             shifted[j] = c[j] + sign * column[3 + j]
-        if len(c) > 18:
-            earth_k = along(on_the_base(world.earth, shifted), axes, e)
+        if extended:
+            earth_k = along(on_the_base(world.earth, shifted, extended), axes, e)
         d = hat((sign * column[0], sign * column[1], sign * column[2]), e, signs)
-        d = step(at, d, along(platform_rate(turn.commanded, shifted), axes, e), earth_k, turn.dt, turn.euler)
+        rate = along(platform_rate(turn.commanded, shifted, extended), axes, e)
+        d = step(at, d, rate, earth_k, turn.dt, turn.euler)
         z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = hat(d, e, signs)
 
 
@@ -182,7 +191,9 @@ def _add_walk(P: Array, thy: float, variance: float, world: World) -> None:
 
 
 @kernel
-def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: Array, z: Array) -> None:
+def _read(
+    th: Array, c: Array, extended: bool, world: World, columns: Array, shifted: Array, f: Array, z: Array
+) -> None:
     """Put into ``z`` (2 n + 1, 6) readings of accelerometers [m/s^2] and encoders [rad, against ``th``] at all points
     of ``columns`` (n, n); ``shifted`` (p,) and ``f`` (3,) are used up."""
     axes, signs = world.axes, world.signs
@@ -190,10 +201,10 @@ def _read(th: Array, c: Array, world: World, columns: Array, shifted: Array, f: 
     at, up_k = cosines(hat(th, e, signs)), along(world.up, axes, 1.0)
     for k in range(2 * n):
         column, sign = (columns[k], 1.0) if k < n else (columns[k - n], -1.0)
-        for j in range(len(c)):
+        for j in range(len(shifted)):
             shifted[j] = c[j] + sign * column[3 + j]
-        if len(c) > 18:
-            up_k = along(on_the_base(world.up, shifted), axes, 1.0)
+        if extended:
+            up_k = along(on_the_base(world.up, shifted, extended), axes, 1.0)
         d = (sign * column[0], sign * column[1], sign * column[2])
         f[axes[0]], f[axes[1]], f[axes[2]] = force(near(at, hat(d, e, signs)), up_k)
         z[1 + k, 0], z[1 + k, 1], z[1 + k, 2] = accelerometers((f[0], f[1], f[2]), shifted)
@@ -208,7 +219,7 @@ def _advance(
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
     intervals, rate, acc, th_m, _, _ = steps
-    n, p = len(P), len(c)
+    n, p = len(P), len(P) - 3
     _, _, other, spread = weights(n, 1.0, 0.0, 0.0)  # those of the centre are zero
     points, shifted = empty_points(n), np.empty(p)
     moved, moves = np.zeros((2 * n + 1, 3)), empty_moments(n, 3)
@@ -218,7 +229,7 @@ def _advance(
     for k in range(len(intervals)):
         dt, w = intervals[k], (rate[k, 0], rate[k, 1], rate[k, 2])
         draw(P, factor, spread, points)
-        _predict(th, c, GimbalStep(w, dt, euler), world, points.columns, shifted, moved)
+        _predict(th, c, layout.based, GimbalStep(w, dt, euler), world, points.columns, shifted, moved)
         moments(moved, points.columns, other, moves)
         for i in range(3):
             th[i] += moves.mean[i]
@@ -238,13 +249,13 @@ def _advance(
                 read[i] = nearest_turn(th_m[k, i], read[i])
             cosine = _lesser(abs(math.cos(read[1])), cosine)
             of_encoders = attitude(read, world.axes, world.signs)
-            watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, level)
+            watch(specific_force(of_encoders, on_the_base(world.up, c, layout.based)), gate, level)
         take = updating(gate, level)
         for i in range(3):
             r[i] = acc[k, i] if take and admitted(i, gate, level) else math.nan
             r[3 + i] = read[i] - th[i] if take and seen else math.nan
         draw(P, factor, spread, points)
-        _read(th, c, world, points.columns, shifted, f, z)
+        _read(th, c, layout.based, world, points.columns, shifted, f, z)
         moments(z, points.columns, other, of_points)
         for i in range(6):
             sigma = noise.accelerometer if i < 3 else noise.encoder

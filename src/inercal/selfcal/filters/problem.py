@@ -14,14 +14,15 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel
 from inercal.arrays import Array
-from inercal.geometry.kernels import Vector
+from inercal.geometry.kernels import Quaternion, Vector
 from inercal.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.selfcal.platform.linearised import AXES, FLOOR, STIFF, empty_columns, encoder_columns
-from inercal.selfcal.platform.model import Rates, encoders_attitude, on_the_base
+from inercal.selfcal.platform.layout import Layout
+from inercal.selfcal.platform.linearised import AXES, FLOOR, STIFF
+from inercal.selfcal.platform.model import Rates, Room, base_of, encoders, room
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import ALL, Layout, StateVector
+from inercal.selfcal.platform.states import ALL, StateVector
 from inercal.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
 
 _OFF, _ANY, _TWO, _CHANNEL = range(4)
@@ -189,12 +190,16 @@ class Start:
 def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tuple[Array, Array]:
     """Attitude (4,) of p as encoders have it that read ``th`` (3,) [rad], and its change (3, p) [rad, about the axes of
     p] per change of the states ``c`` (p,); ``rate`` (3,) [rad/s] as read about that time."""
-    world, layout, full = problem.world, problem.states.layout, problem.states.full(c)
-    w, earth, up = (rate[0], rate[1], rate[2]), on_the_base(world.earth, full), on_the_base(world.up, full)
-    read = Rates(w, w)
-    q = encoders_attitude(th, read, earth, up, full, layout, world.axes, world.signs)
-    columns = empty_columns()
-    count = encoder_columns(th, q, read, earth, up, full, layout, world.axes, world.signs, columns)
-    slope = np.zeros((3, len(c)))
-    slope[:, columns.places[:count] - 3] = columns.axes[:count].T
+    layout, own, slope = problem.states.layout, room(), np.zeros((3, len(c)))
+    th, rate = np.array(th, dtype=float), np.array(rate, dtype=float)
+    q = _encoders_at(th, rate, problem.states.full(c), layout, problem.world, own)
+    slope[:, layout.columns - 3] = own.axes[: len(layout.columns)].T
     return np.array(q), slope
+
+
+@allocating
+def _encoders_at(th: Array, rate: Array, c: Array, layout: Layout, world: World, own: Room) -> Quaternion:
+    """The attitude (4,) of encoders, for `encoders_at`; its columns in ``own``."""
+    w, base = (rate[0], rate[1], rate[2]), base_of(c, layout.based, world)
+    q = encoders(th, Rates(w, w), base, c, layout, world, own)
+    return q

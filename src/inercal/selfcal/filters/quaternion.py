@@ -27,9 +27,10 @@ from inercal.estimate.sigma_point import covariance, cross, draw, empty_points, 
 from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.selfcal.estimators import FACTOR_OF
 from inercal.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
+from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.selfcal.filters.problem import FilterModel, FilterProblem, Start, admitted, updating, watch
 from inercal.selfcal.platform.kinematics import attitude, joint_axes, nearest_turn
-from inercal.selfcal.platform.model import accelerometers, on_the_base, platform_rate, specific_force
+from inercal.selfcal.platform.model import specific_force
 from inercal.selfcal.platform.recording import Steps
 from inercal.selfcal.platform.rig import World
 
@@ -128,18 +129,27 @@ class PointReadings(NamedTuple):
 
 @kernel
 def _propagate(
-    q: Quaternion, c: Array, columns: Array, turn: QuaternionStep, world: World, ck: Array, out: PointReadings
+    q: Quaternion,
+    c: Array,
+    extended: bool,
+    columns: Array,
+    turn: QuaternionStep,
+    world: World,
+    ck: Array,
+    out: PointReadings,
 ) -> None:
-    """Take all points through a step and read the accelerometers there: ``q`` (4,) and ``c`` (p,) the mean before,
-    ``columns`` (n, n) the deviations of the points, row by row, n = 4 + p; ``ck`` (p,) is used up."""
-    n, p = len(columns), len(c)
+    """Take all points through a step and read the accelerometers there.
+
+    ``q`` (4,) and ``c`` (p,), ``extended`` or not, are the mean before, ``columns`` (n, n) the deviations of the
+    points, row by row, n = 4 + p; ``ck`` (p,) is used up.
+    """
+    n, p = len(columns), len(columns) - 4
     w, dt, walk = turn
     centre, z, odd = out
     earth, up = world.earth, world.up
-    extended = p > 18
-    earth_e, up_e = on_the_base(earth, c), on_the_base(up, c)
+    earth_e, up_e = on_the_base(earth, c, extended), on_the_base(up, c, extended)
     by_earth = exp((-earth_e[0] * dt, -earth_e[1] * dt, -earth_e[2] * dt))
-    rate = platform_rate(w, c)
+    rate = platform_rate(w, c, extended)
     at = multiply(multiply(by_earth, q), exp((rate[0] * dt, rate[1] * dt, rate[2] * dt)))
     centre.fill(0.0)
     _put(centre, at, accelerometers(_force(at, up_e), c), centre)
@@ -153,9 +163,9 @@ def _propagate(
                 ck[i] = c[i] + s * d[4 + i]
             qk = (q[0] + s * d[0], q[1] + s * d[1], q[2] + s * d[2], q[3] + s * d[3])
             if extended:
-                earth_e, up_k = on_the_base(earth, ck), on_the_base(up, ck)
+                earth_e, up_k = on_the_base(earth, ck, extended), on_the_base(up, ck, extended)
                 by_earth_k = exp((-earth_e[0] * dt, -earth_e[1] * dt, -earth_e[2] * dt))
-            rate = platform_rate(w, ck)
+            rate = platform_rate(w, ck, extended)
             qk = multiply(multiply(by_earth_k, qk), exp((rate[0] * dt, rate[1] * dt, rate[2] * dt)))
             _put(z[1 + 2 * j + side], qk, accelerometers(_force(qk, up_k), ck), centre)
         for i in range(7):
@@ -175,9 +185,9 @@ def _advance(
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th
-    world, noise, gate, _ = model
+    world, noise, gate, layout = model
     intervals, rates, acc, th, _, _ = steps
-    n, p = len(P), len(c)
+    n, p = len(P), len(P) - 4
     _, _, other, spread = weights(n + 8, 1.0, 0.0, 0.0)
     points, ck = empty_points(n), np.empty(p)
     z, odd, centre, shift = np.empty((1 + 2 * n + 6, 7)), np.empty((n, 7)), np.empty(7), np.empty(7)
@@ -191,7 +201,14 @@ def _advance(
         draw(P, factor, spread, points)
         walk = spread * 0.5 * noise.angle_random_walk * math.sqrt(dt)
         _propagate(
-            q, c, points.columns, QuaternionStep(w, dt, walk), world, ck, PointReadings(centre, z, odd)
+            q,
+            c,
+            layout.based,
+            points.columns,
+            QuaternionStep(w, dt, walk),
+            world,
+            ck,
+            PointReadings(centre, z, odd),
         )
 
         # moments: the centre has no weight, and all points that were not written lie there
@@ -218,7 +235,7 @@ def _advance(
                 angles[i] = nearest_turn(th[k, i], angles[i])
             cosine = min(cosine, abs(math.cos(angles[1])))
             of_encoders = attitude(angles, world.axes, world.signs)
-            watch(specific_force(of_encoders, on_the_base(world.up, c)), gate, near)
+            watch(specific_force(of_encoders, on_the_base(world.up, c, layout.based)), gate, near)
         take = updating(gate, near)
         count = 0
         if take and seen:

@@ -21,14 +21,10 @@ from inercal.geometry.rotations import (
     exp,
     inverse_left_jacobian,
     multiply,
-    right_jacobian,
     rotate,
-    skew,
-    to_matrix,
 )
 from inercal.selfcal.filters.filter_result import FilterResult, History
 from inercal.selfcal.filters.problem import FilterProblem, Start, admitted, apart, updating, watch
-from inercal.selfcal.platform.coefficients import BETA, KA0, KA1, KG0, KG1
 from inercal.selfcal.platform.linearised_rows import LinearisedRows, linearise_rows, linearise_steps
 from inercal.selfcal.platform.recording import Recording, Steps
 from inercal.selfcal.platform.rig import World
@@ -172,26 +168,6 @@ def first_reading(recording: Recording, problem: FilterProblem) -> Start:
     return Start(gimbals(recording.th[:1], problem.world)[0][0], problem.noise.encoder)
 
 
-class OnBase(NamedTuple):
-    """Earth rate (3,) [rad/s] and specific force at rest (3,) [m/s^2] in the frame of the encoders, and their
-    derivatives (3, 3) by beta; these are None without the extended model."""
-
-    earth: Array
-    up: Array
-    earth_slope: Array | None
-    up_slope: Array | None
-
-
-def on_base(c: Array, world: World) -> OnBase:
-    """The world as coefficients (p,) have it: turned by beta, where ``d(R(beta) v) = -[R v]x Jr(-beta) dbeta``."""
-    if len(c) <= BETA.start:
-        return OnBase(world.earth, world.up, None, None)
-    turn = exp(c[BETA])
-    earth, up = rotate(turn, world.earth), rotate(turn, world.up)
-    left = right_jacobian(-c[BETA])
-    return OnBase(earth, up, -skew(earth) @ left, -skew(up) @ left)
-
-
 class Sensed(NamedTuple):
     """Whitened residuals (m, 6) of accelerometers and of the encoders' attitude, and the derivatives of the model by
     the attitude (m, 6, 3) and by the coefficients (m, 6, p); 0 where nothing was measured."""
@@ -203,38 +179,9 @@ class Sensed(NamedTuple):
 
 def sensed(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -> Sensed:
     """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
-    world = problem.world
-    if problem.states.of_rig:
-        return _sensed_on_rig(q, c, measured, problem)
-    base = on_base(c, world)
-    back = conjugate(q)
-    f = rotate(back, base.up)
-    through = np.array([[1.0 + c[15], 0.0, 0.0], [-c[4], 1.0 + c[16], 0.0], [c[3], -c[5], 1.0 + c[17]]])
-    miss = boxminus(measured.attitude, q)
-    weight, whitening = measured.acc_weight, measured.whitening
-    residual = np.concatenate(
-        [(measured.acc - c[KA0] - f @ through.T) * weight, np.einsum("kij,kj->ki", whitening, miss)], axis=1
-    )
-    by_attitude = np.empty((len(q), 6, 3))
-    by_attitude[:, :3] = (through @ skew(f)) * weight[:, :, None]
-    by_attitude[:, 3:] = whitening @ inverse_left_jacobian(miss)
-    by_coefficients = np.zeros((len(q), 6, len(c)))
-    by_coefficients[:, :3, KA0] = np.eye(3)
-    for i in range(3):
-        by_coefficients[:, i, KA1.start + i] = f[:, i]
-    by_coefficients[:, 2, 3], by_coefficients[:, 1, 4], by_coefficients[:, 2, 5] = f[:, 0], -f[:, 0], -f[:, 1]
-    if base.up_slope is not None:
-        by_coefficients[:, :3, BETA] = through @ np.swapaxes(to_matrix(q), 1, 2) @ base.up_slope
-    by_coefficients[:, :3] *= weight[:, :, None]
-    return Sensed(residual, by_attitude, by_coefficients)
-
-
-def _sensed_on_rig(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -> Sensed:
-    """`sensed` where there are states of the rig, or stated values of them."""
-    m, p, states = len(q), len(c), problem.states
-    of_encoders, expected = np.empty((m, 4)), np.empty((m, 3))
-    by_encoders, by_acc = np.zeros((m, 3, 3 + p)), np.zeros((m, 3, 3 + p))
-    rows = LinearisedRows(of_encoders, by_encoders, expected, by_acc)
+    m, states = len(q), problem.states
+    of_encoders, expected, by = np.empty((m, 4)), np.empty((m, 3)), np.zeros((m, 6, 3 + len(c)))
+    rows = LinearisedRows(of_encoders, expected, by)
     linearise_rows(q, measured.th, measured.steps, states.full(c), states.layout, problem.world, rows)
     weight, whitening = measured.acc_weight, measured.whitening
     miss = boxminus(of_encoders, q)
@@ -242,35 +189,20 @@ def _sensed_on_rig(q: Array, c: Array, measured: Measurements, problem: FilterPr
     residual = np.concatenate(
         [(measured.acc - expected) * weight, np.einsum("kij,kj->ki", whitening, miss)], axis=1
     )
-    by_acc *= weight[:, :, None]
+    by[:, :3] *= weight[:, :, None]
     # miss = log(q* q_e): a change of q_e from the right moves it by the inverse right Jacobian
-    right = np.swapaxes(left, 1, 2)
-    by_attitude = np.concatenate([by_acc[:, :, :3], whitening @ left], axis=1)
-    by_coefficients = np.concatenate([by_acc[:, :, 3:], -whitening @ right @ by_encoders[:, :, 3:]], axis=1)
-    return Sensed(residual, by_attitude, by_coefficients)
+    by[:, 3:, 3:] = -whitening @ np.swapaxes(left, 1, 2) @ by[:, 3:, 3:]
+    by[:, 3:, :3] = whitening @ left
+    return Sensed(residual, by[:, :, :3], by[:, :, 3:])
 
 
-def turns_on_rig(q: Array, steps: Steps, c: Array, problem: FilterProblem) -> tuple[Array, Array]:
-    """`turns` where there are states of the rig, with beta too; ``q`` (m, 4) attitudes after the steps."""
+def turns(q: Array, steps: Steps, c: Array, problem: FilterProblem) -> tuple[Array, Array]:
+    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step from attitude ``q`` (m, 4), and
+    the rotations (m, 3, p), about the axes of p after the step, per change of each state ``c`` (p,)."""
     m, states = len(q), problem.states
-    turn, slope = np.empty((m, 3)), np.zeros((m, 3, len(c)))
+    turn, slope = np.empty((m, 3)), np.empty((m, 3, len(c)))
     linearise_steps(q, steps, states.full(c), states.layout, problem.world, turn, slope)
     return turn, slope
-
-
-def turns(rate: Array, dt: Array, c: Array) -> tuple[Array, Array]:
-    """Rotation vectors (m, 3) [rad] of the platform against inertial space in each step, at commanded ``rate`` (m, 3),
-    and the rotations (m, 3, p), about the axes of p after the step, per change of each coefficient."""
-    x, y, z = rate.T
-    slope = np.zeros((len(rate), 3, len(c)))
-    slope[:, :, KG0] = np.eye(3)
-    slope[:, 0, 6], slope[:, 1, 7], slope[:, 2, 8] = y, z, x
-    slope[:, 0, 9], slope[:, 1, 10], slope[:, 2, 11] = -z, -x, -y
-    if len(c) > KG1.start:
-        for i in range(3):
-            slope[:, i, KG1.start + i] = rate[:, i]
-    turn = (rate + slope @ c) * dt[:, None]
-    return turn, right_jacobian(turn) @ slope * dt[:, None, None]
 
 
 def followed(q0: Array, turn: Array) -> Array:

@@ -1,21 +1,26 @@
-"""Compiled model of the platform: its rate, its attitude from step to step, its accelerometers and encoders.
+"""Compiled model of the platform, once: its rate, the attitude of its encoders, the outputs of its accelerometers, each
+with its columns by the states from the same numbers.
 
-Parameters ``c`` are the full vector of `inercal.selfcal.platform.states`, in the linear form: the paper's 18, the 24
-of the extended model, or all (K,) with those of the rig. Attitudes are ``q_ep`` against the frame e of the encoders;
-earth rate and gravity in b turn with beta. With the states of the rig
+Parameters ``c`` are the full vector (K,) of `inercal.selfcal.platform.states`, in the linear form; a `Layout` says
+which of them are states. Attitudes are ``q_ep`` against the frame e of the encoders; earth rate and gravity in b turn
+with beta. With coefficients c and quantities v of a linear port (`inercal.selfcal.platform.layout`), f the specific
+force in p, T how much warmer it is than the temperature of the coefficients,
 
-    q_ep = R_i(th_x) qexp(nonorth_xy e_k) R_j(th_y - zero_y) qexp(nonorth_yz e_i) R_k(th_z) qexp(gamma) qexp(sag x f)
+    rate     w' = w + M w + kg0 + sum c v(w, f, T)
+    force    f' = f + sum c v(w'),   v the rows of [w']x [w']x           levers
+    output   a  = ka0 + s + sum c v(s, T),   s the linear output at f'   K2 s^2 / (1 + ka1), by temperature, walks
+    angle    th' = th - sum c v(th)                                      zero_y, harmonics
+    chain    q_ep = R_i(th'_x) R_k(nonorth_xy) R_j(th'_y) R_i(nonorth_yz) R_k(th'_z) qexp(gamma) qexp(sag x f)
 
-for joints about the axes i, j, k of p, th the readings without their harmonics, f the specific force in p; each
-accelerometer reads ``ka0 + s + K2 s^2 / (1 + ka1)``, s its output without them at the specific force
-``f + w x (w x r)``, r its place and w the rate against inertial space. Gyros drift by ``G f``.
+for joints about the axes i, j, k of p. The error state is dtheta (3) [rad], right-handed about the axes of p, then the
+states: ``q_true = q qexp(dtheta)``; a column is an axis in p per unit of the state.
 
-Biases are ``kg0`` and ``ka0`` in the mean, and walk about them. At another temperature than that of the coefficients
-kg0, ka0 and ka1 change with it.
+Biases are ``kg0`` and ``ka0`` in the mean, and walk about them. A sensor that is late by tau reads at t what was at
+t - tau, in the clock of the rates: a delay that all share is only another time. Rates are held from row to row, and the
+platform has turned since then at the rate before the row, or will turn until then at the one after it where tau is
+negative.
 
-A sensor that is late by tau reads at t what was at t - tau, in the clock of the rates: a delay that all share is only
-another time. Rates are held from row to row, and the platform has turned since then at the rate before the row, or
-will turn until then at the one after it where tau is negative.
+Most kernels here are `merged`: a layout that is handed over from kernel to kernel costs as much as a step of 18 states.
 """
 
 from __future__ import annotations
@@ -26,67 +31,121 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal._jit import kernel
+from inercal._jit import allocating, kernel, merged
 from inercal.arrays import Array
-from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
-from inercal.selfcal.platform.kinematics import Axes, attitude, elementary, joint_axes, nearest_turn
+from inercal.geometry.kernels import Quaternion, Vector, exp, multiply, right_jacobian, rotate
+from inercal.selfcal.platform.kinematics import Axes, elementary, joint_axes, unit
+from inercal.selfcal.platform.layout import Layout
 from inercal.selfcal.platform.rig import World
-from inercal.selfcal.platform.states import (
-    ASYM,
-    BY_FORCE,
-    GAMMA,
-    K2,
-    LEVER,
-    NONORTH,
-    SAG,
-    TAU,
-    WALK,
-    WARM,
-    WAVE,
-    ZERO_Y,
-    Layout,
-)
+from inercal.selfcal.platform.states import BETA, GAMMA, SAG, TAU
+
+Vectors = tuple[Vector, Vector, Vector]
+
+WIDEST = 80
+"""Most entries of a row of the model, and most columns of states."""
+
+SLOT, PLACE, AXIS, QUANTITY, ORDER, ENTRY = range(6)
+"""Columns of `Layout.terms`."""
+
+STILL = (0.0, 0.0, 0.0)
+"""No vector, for kernels."""
+
+
+class Room(NamedTuple):
+    """Room for what a row makes: quantities ``of_rate`` (WIDEST,) of the terms of the rate; ``axes`` (WIDEST, 3) of the
+    encoders' columns; ``entries`` (3, WIDEST) of the accelerometers' rows. ``quantities`` (WIDEST,) and ``small``
+    (5, 3) sums, angles and joints are used up."""
+
+    of_rate: Array
+    axes: Array
+    entries: Array
+    quantities: Array
+    small: Array
+
+
+@allocating
+def room() -> Room:
+    """Room for a row."""
+    return Room(
+        np.zeros(WIDEST), np.zeros((WIDEST, 3)), np.zeros((3, WIDEST)), np.zeros(WIDEST), np.zeros((5, 3))
+    )
+
+
+class Base(NamedTuple):
+    """The world in the frame of the encoders: ``earth`` rate (3,) [rad/s], and the specific force at rest ``up`` (3,)
+    [m/s^2]."""
+
+    earth: Vector
+    up: Vector
 
 
 @kernel
-def platform_rate(w: Vector | Array, c: Array) -> Vector:
-    """Rate ``w_Ip^p`` (3,) [rad/s] of a platform that is commanded ``w`` (3,): ``w + M w + kg0``."""
-    x = w[0] + c[0] + c[6] * w[1] - c[9] * w[2]
-    y = w[1] + c[1] - c[10] * w[0] + c[7] * w[2]
-    z = w[2] + c[2] + c[8] * w[0] - c[11] * w[1]
-    if len(c) > 18:
-        x, y, z = x + c[18] * w[0], y + c[19] * w[1], z + c[20] * w[2]
-    if len(c) > 24:
-        x += 0.5 * c[ASYM] * abs(w[0]) + c[WALK]
-        y += 0.5 * c[ASYM + 1] * abs(w[1]) + c[WALK + 1]
-        z += 0.5 * c[ASYM + 2] * abs(w[2]) + c[WALK + 2]
-    return x, y, z
+def base_of(c: Array, based: bool, world: World) -> Base:
+    """The world, turned by beta where the base is."""
+    earth, up = (world.earth[0], world.earth[1], world.earth[2]), (world.up[0], world.up[1], world.up[2])
+    if not based:
+        return Base(earth, up)
+    turn = exp((c[BETA], c[BETA + 1], c[BETA + 2]))
+    return Base(rotate(turn, earth), rotate(turn, up))
 
 
 @kernel
-def force_within(q: Quaternion | Array, w: Vector, by: float, up: Vector) -> Vector:
-    """Specific force (3,) [m/s^2] in p at rest, ``by`` [s] after attitude ``q`` at a rate ``w`` (3,) [rad/s]."""
-    return specific_force(multiply((q[0], q[1], q[2], q[3]), exp((by * w[0], by * w[1], by * w[2]))), up)
-
-
-@kernel
-def drifting(rate: Vector, f: Vector, warm: float, c: Array) -> Vector:
-    """A ``rate`` (3,) [rad/s] of the platform with what gyros drift by specific force ``f`` (3,) [m/s^2] and ``warm``
-    [K] above the temperature of the coefficients."""
-    x, y, z = BY_FORCE, BY_FORCE + 3, BY_FORCE + 6
+def turned_by_beta(v: Vector, q: Quaternion, c: Array) -> Vectors:
+    """Changes of a vector of the base, in p at attitude ``q``, per change of each component of beta; ``v`` (3,) is the
+    vector in the frame of the encoders, turned by beta already: d(R(beta) v) = -[R v]x Jr(-beta) dbeta."""
+    j = right_jacobian((-c[BETA], -c[BETA + 1], -c[BETA + 2]))
+    back = (q[0], -q[1], -q[2], -q[3])
     return (
-        rate[0] + c[x] * f[0] + c[x + 1] * f[1] + c[x + 2] * f[2] + c[WARM] * warm,
-        rate[1] + c[y] * f[0] + c[y + 1] * f[1] + c[y + 2] * f[2] + c[WARM + 1] * warm,
-        rate[2] + c[z] * f[0] + c[z + 1] * f[1] + c[z + 2] * f[2] + c[WARM + 2] * warm,
+        rotate(back, cross((j[0][0], j[1][0], j[2][0]), v)),
+        rotate(back, cross((j[0][1], j[1][1], j[2][1]), v)),
+        rotate(back, cross((j[0][2], j[1][2], j[2][2]), v)),
     )
 
 
 @kernel
-def on_the_base(v_b: Vector | Array, c: Array) -> Vector:
-    """A vector stated in the base, in the frame of the encoders: turned by beta."""
-    if len(c) > 18:
-        return rotate(exp((c[21], c[22], c[23])), v_b)
-    return v_b[0], v_b[1], v_b[2]
+def cross(a: Vector, b: Vector) -> Vector:
+    """Cross product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def specific_force(q: Quaternion | Array, up: Vector) -> Vector:
+    """Specific force (3,) [m/s^2] in p of a platform at rest, ``up`` that in the frame of the encoders."""
+    return rotate((q[0], -q[1], -q[2], -q[3]), up)
+
+
+@merged
+def force_within(q: Quaternion, w: Vector, by: float, up: Vector, wanted: bool) -> Vector:
+    """Specific force (3,) [m/s^2] in p, ``by`` [s] after attitude ``q`` at a rate ``w`` (3,) [rad/s]; 0 where no state
+    asks for it."""
+    return specific_force(multiply(q, exp((by * w[0], by * w[1], by * w[2]))), up) if wanted else STILL
+
+
+@kernel
+def rate_quantities(w: Vector, f: Vector, warm: float) -> tuple[float, ...]:
+    """Quantities of the rate, in the order of `QUANTITIES`; as plain Python it also takes arrays."""
+    asymmetry = (0.5 * abs(w[0]), 0.5 * abs(w[1]), 0.5 * abs(w[2]))
+    return (*w, *asymmetry, *f, warm, 1.0)
+
+
+@merged
+def turning(w: Vector, f: Vector, warm: float, c: Array, layout: Layout, own: Room) -> Vector:
+    """Rate ``w_Ip^p`` (3,) [rad/s] of a platform that is commanded ``w`` (3,), at specific force ``f`` (3,) [m/s^2] and
+    ``warm`` [K] above the temperature of the coefficients; quantities of its terms in ``own.of_rate``."""
+    x = w[0] + c[0] + c[6] * w[1] - c[9] * w[2]
+    y = w[1] + c[1] - c[10] * w[0] + c[7] * w[2]
+    z = w[2] + c[2] + c[8] * w[0] - c[11] * w[1]
+    if layout.until[0] == 0:
+        return x, y, z
+    quantities, total, terms = own.quantities, own.small[0], layout.terms
+    total[0], total[1], total[2] = x, y, z
+    v = rate_quantities((w[0], w[1], w[2]), f, warm)
+    for i in range(len(v)):
+        quantities[i] = v[i]
+    for a in range(layout.until[0]):
+        own.of_rate[a] = quantities[terms[a, QUANTITY]]
+        total[terms[a, AXIS]] += c[terms[a, SLOT]] * own.of_rate[a]
+    return total[0], total[1], total[2]
 
 
 @kernel
@@ -110,159 +169,6 @@ class Rates(NamedTuple):
 def rate_at(read: Rates, late: float) -> Vector:
     """Rate (3,) [rad/s] as read by when a sensor that is ``late`` [s] was read."""
     return read.before if late >= 0.0 else read.after
-
-
-@kernel
-def specific_force(q: Quaternion | Array, up: Vector) -> Vector:
-    """Specific force (3,) [m/s^2] in p of a platform at rest, ``up`` that in the frame of the encoders."""
-    return rotate((q[0], -q[1], -q[2], -q[3]), up)
-
-
-@kernel
-def accelerometers(f: Vector, c: Array) -> Vector:
-    """Outputs (3,) [m/s^2] at specific force ``f`` (3,), linear form, without K2 and levers."""
-    return (
-        c[12] + (1.0 + c[15]) * f[0],
-        c[13] + (1.0 + c[16]) * f[1] - c[4] * f[0],
-        c[14] + (1.0 + c[17]) * f[2] + c[3] * f[0] - c[5] * f[1],
-    )
-
-
-@kernel
-def centripetal(i: int, w: Vector) -> Vector:
-    """Acceleration (3,) [1/s^2] of accelerometer ``i`` along its axis, per place along x, y, z: row i of [w]x [w]x."""
-    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    return (
-        w[i] * w[0] - (square if i == 0 else 0.0),
-        w[i] * w[1] - (square if i == 1 else 0.0),
-        w[i] * w[2] - (square if i == 2 else 0.0),
-    )
-
-
-@kernel
-def squared(signal: float, i: int, c: Array) -> float:
-    """Output [m/s^2] of accelerometer ``i`` per K2, at its ``signal`` [m/s^2] without bias."""
-    return float(signal * signal / (1.0 + c[15 + i]))
-
-
-@kernel
-def rig_accelerometers(f: Vector, w: Vector, warm: float, c: Array) -> Vector:
-    """Outputs (3,) [m/s^2] at specific force ``f`` (3,) at the centre of the gimbals and rate ``w`` (3,) [rad/s]
-    against inertial space, ``warm`` [K] above the temperature of the coefficients, with K2 and levers."""
-    by_x, by_y, by_z = centripetal(0, w), centripetal(1, w), centripetal(2, w)
-    there = (
-        f[0] + by_x[0] * c[LEVER] + by_x[1] * c[LEVER + 1] + by_x[2] * c[LEVER + 2],
-        f[1] + by_y[0] * c[LEVER + 3] + by_y[1] * c[LEVER + 4] + by_y[2] * c[LEVER + 5],
-        f[2] + by_z[0] * c[LEVER + 6] + by_z[1] * c[LEVER + 7] + by_z[2] * c[LEVER + 8],
-    )
-    x, y, z = accelerometers(there, c)
-    return (
-        x + _beside(x - c[12], 0, warm, c),
-        y + _beside(y - c[13], 1, warm, c),
-        z + _beside(z - c[14], 2, warm, c),
-    )
-
-
-@kernel
-def _beside(signal: float, i: int, warm: float, c: Array) -> float:
-    """Output [m/s^2] of accelerometer ``i`` beside the linear one, at its ``signal`` [m/s^2] without bias."""
-    by_temperature = c[WARM + 3 + i] + c[WARM + 6 + i] * signal / (1.0 + c[15 + i])
-    return float(c[K2 + i] * squared(signal, i, c) + c[WALK + 3 + i] + warm * by_temperature)
-
-
-class Sensing(NamedTuple):
-    """The platform as its accelerometers sense it at a row: specific ``force`` (3,) [m/s^2] at the centre of the
-    gimbals, in p of the ``attitude`` (4,) then; its ``rate`` (3,) [rad/s] against inertial space and the one
-    ``over_base``; how ``warm`` [K] it is, above the temperature of the coefficients."""
-
-    force: Vector
-    attitude: Quaternion
-    rate: Vector
-    over_base: Vector
-    warm: float
-
-
-@kernel
-def sensing(q: Quaternion, read: Rates, earth: Vector, up: Vector, warm: float, c: Array) -> Sensing:
-    """The platform as accelerometers late by tau_a sense it at a row of attitude ``q``."""
-    if len(c) > 24:
-        return sensing_late(q, read, earth, up, warm, c)
-    return Sensing(specific_force(q, up), q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
-
-
-@kernel
-def sensing_late(q: Quaternion, read: Rates, earth: Vector, up: Vector, warm: float, c: Array) -> Sensing:
-    """`sensing` with a delay."""
-    rate = platform_rate(rate_at(read, c[TAU + 1]), c)
-    then = propagate(q, rate, earth, -c[TAU + 1])
-    v = specific_force(then, earth)
-    over_base = (rate[0] - v[0], rate[1] - v[1], rate[2] - v[2])
-    return Sensing(specific_force(then, up), then, rate, over_base, warm)
-
-
-@kernel
-def outputs(sensed: Sensing, c: Array) -> Vector:
-    """Outputs (3,) [m/s^2] of the accelerometers."""
-    if len(c) <= 24:
-        return accelerometers(sensed.force, c)
-    return rig_accelerometers(sensed.force, sensed.rate, sensed.warm, c)
-
-
-@kernel
-def joints_attitude(th: Vector | Array, c: Array, axes: Axes, signs: Array) -> Quaternion:
-    """Attitude of p as the encoders read it (3,) [rad], at once, with gamma, non-orthogonality and zero_y."""
-    outer = multiply(elementary(axes[0], signs[0] * th[0]), elementary(axes[2], c[NONORTH]))
-    inner = multiply(elementary(axes[1], signs[1] * (th[1] - c[ZERO_Y])), elementary(axes[0], c[NONORTH + 1]))
-    last = multiply(elementary(axes[2], signs[2] * th[2]), exp((c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])))
-    return multiply(multiply(outer, inner), last)
-
-
-@kernel
-def sagging(q: Quaternion, up: Vector, c: Array) -> Vector:
-    """Turn (3,) [rad] of the sensors on a platform of attitude ``q``, which gravity bends: sag x f."""
-    f = specific_force(q, up)
-    x, y, z = c[SAG], c[SAG + 1], c[SAG + 2]
-    return y * f[2] - z * f[1], z * f[0] - x * f[2], x * f[1] - y * f[0]
-
-
-@kernel
-def without_harmonics(th: Vector | Array, c: Array, waves: NDArray[np.int64]) -> Vector:
-    """Angles (3,) [rad] without the harmonics of encoders that read ``th`` (3,) [rad]; ``waves`` as of a layout."""
-    x, y, z = th[0], th[1], th[2]
-    for k in range(len(waves)):
-        joint, at = waves[k, 0], waves[k, 1] * th[waves[k, 0]]
-        error = c[WAVE + 2 * k] * math.sin(at) + c[WAVE + 2 * k + 1] * math.cos(at)
-        if joint == 0:
-            x -= error
-        elif joint == 1:
-            y -= error
-        else:
-            z -= error
-    return x, y, z
-
-
-@kernel
-def encoders_attitude(
-    th: Vector | Array,
-    read: Rates,
-    earth: Vector,
-    up: Vector,
-    c: Array,
-    layout: Layout,
-    axes: Axes,
-    signs: Array,
-) -> Quaternion:
-    """Attitude of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc."""
-    if len(c) > 24:
-        q = joints_attitude(without_harmonics(th, c, layout.waves), c, axes, signs)
-        q = multiply(q, exp(sagging(q, up, c)))
-        rate, tau = platform_rate(rate_at(read, c[TAU]), c), c[TAU]
-        if layout.turning.all():
-            return propagate(q, rate, earth, tau)
-        v = specific_force(q, earth)
-        by = about_turning((rate[0] - v[0], rate[1] - v[1], rate[2] - v[2]), th, layout.turning, axes, signs)
-        return multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
-    return attitude(th, axes, signs)
 
 
 @kernel
@@ -290,92 +196,161 @@ def about_turning(
     return rate[0] - beside * across[0], rate[1] - beside * across[1], rate[2] - beside * across[2]
 
 
-@kernel
-def encoders_read(q: Quaternion, near: Vector, c: Array, world: World) -> Vector:
-    """Readings (3,) [rad] of encoders at once at attitude ``q``, by Newton's method from ``near`` (3,)."""
-    th = near
-    for _ in range(6):
-        miss = boxminus_of(joints_attitude(th, c, world.axes, world.signs), q)
-        th = _moved(th, miss, world)
-    return th
+@merged
+def joint_angles(th: Vector | Array, c: Array, layout: Layout, own: Room) -> None:
+    """Put the angles of the joints whose encoders read ``th`` (3,) [rad] into ``own.small[1]``, and the quantities of
+    their terms into ``own.quantities``."""
+    angles, terms, first = own.small[1], layout.terms, layout.until[2]
+    angles[0], angles[1], angles[2] = th[0], th[1], th[2]
+    for a in range(first, layout.until[3]):
+        j, kind, order = terms[a, AXIS], terms[a, QUANTITY], terms[a, ORDER]
+        v = 1.0 if kind == 0 else math.sin(order * th[j]) if kind == 1 else math.cos(order * th[j])
+        angles[j] -= c[terms[a, SLOT]] * v
+        own.quantities[a - first] = v
 
 
-@kernel
-def boxminus_of(q: Quaternion, there: Quaternion) -> Vector:
-    """Small rotation (3,) [rad] from attitude ``q`` to another, about the axes of p."""
-    d = multiply((q[0], -q[1], -q[2], -q[3]), there)
-    s = 2.0 if d[0] >= 0.0 else -2.0
-    return s * d[1], s * d[2], s * d[3]
+@merged
+def chain(c: Array, layout: Layout, world: World, own: Room) -> Quaternion:
+    """Inverse (4,) of the attitude of p in the chain of joints at angles ``own.small[1]``; columns of mount and links
+    in ``own.axes``, axes of the joints in p in ``own.small[2:]``.
 
-
-@kernel
-def _moved(th: Vector, miss: Vector, world: World) -> Vector:
-    """Angles (3,) [rad] that turn the platform further by ``miss`` (3,) [rad], to first order."""
-    x, y, z = joint_axes(th, world.axes, world.signs)
-    across = (y[1] * z[2] - y[2] * z[1], y[2] * z[0] - y[0] * z[2], y[0] * z[1] - y[1] * z[0])
-    volume = x[0] * across[0] + x[1] * across[1] + x[2] * across[2]
-    by_y = (z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0])
-    by_z = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    return (
-        th[0] + (across[0] * miss[0] + across[1] * miss[1] + across[2] * miss[2]) / volume,
-        th[1] + (by_y[0] * miss[0] + by_y[1] * miss[1] + by_y[2] * miss[2]) / volume,
-        th[2] + (by_z[0] * miss[0] + by_z[1] * miss[1] + by_z[2] * miss[2]) / volume,
-    )
-
-
-class Truth(NamedTuple):
-    """A true motion of n rows: attitudes ``q`` (n, 4), outputs ``acc`` (n, 3) [m/s^2] of accelerometers and readings
-    ``th`` (n, 3) [rad] of encoders without noise."""
-
-    q: Array
-    acc: Array
-    th: Array
-
-
-@kernel
-def simulate_truth(
-    q0: Array, w: Array, dt: float, noise: Array, warm: Array, c: Array, world: World, out: Truth
-) -> None:
-    """True attitudes and readings, integrated at finer steps of ``dt`` [s], m between rows.
-
-    ``q0`` (4,) attitude at the first row; ``w`` (n - 1, m, 3) [rad/s] at which the platform is commanded to turn and
-    ``noise`` (n - 1, m, 3) [rad/s] of the gyros in each finer step; ``warm`` (n,) [K] above the temperature of the
-    coefficients; ``c`` full vector, linear form. Readings ``th`` are made of the states of the rig alone, from nominal
-    angles that stand there; else they stay as they are.
+    The chain is gone through from the platform outwards: the inverse that grows gives the axis of each turn in p.
     """
-    q, acc, th = out
-    at = (q0[0], q0[1], q0[2], q0[3])
-    earth_e, up_e = on_the_base(world.earth, c), on_the_base(world.up, c)
-    m = w.shape[1]
-    for k in range(len(q)):
-        if k > 0:
-            for j in range(m):
-                commanded = (w[k - 1, j, 0], w[k - 1, j, 1], w[k - 1, j, 2])
-                rate = platform_rate(commanded, c)
-                if len(c) > 24:
-                    rate = drifting(rate, force_within(at, commanded, 0.5 * dt, up_e), warm[k - 1], c)
-                noisy = (
-                    rate[0] + noise[k - 1, j, 0],
-                    rate[1] + noise[k - 1, j, 1],
-                    rate[2] + noise[k - 1, j, 2],
-                )
-                at = normalize(propagate(at, noisy, earth_e, dt))
-        if len(c) <= 24:
-            read = accelerometers(specific_force(at, up_e), c)
-        else:
-            last, first = max(k - 1, 0), min(k, len(w) - 1)
-            before = platform_rate((w[last, m - 1, 0], w[last, m - 1, 1], w[last, m - 1, 2]), c)
-            after = platform_rate((w[first, 0, 0], w[first, 0, 1], w[first, 0, 2]), c)
-            of_acc, of_enc = before if c[TAU + 1] >= 0.0 else after, before if c[TAU] >= 0.0 else after
-            then = propagate(at, of_acc, earth_e, -c[TAU + 1])
-            read = rig_accelerometers(specific_force(then, up_e), of_acc, warm[k], c)
-            near = (th[k, 0], th[k, 1], th[k, 2])
-            seen = propagate(at, of_enc, earth_e, -c[TAU])
-            bent = sagging(seen, up_e, c)
-            angles = encoders_read(multiply(seen, exp((-bent[0], -bent[1], -bent[2]))), near, c, world)
-            for i in range(3):
-                th[k, i] = nearest_turn(angles[i], near[i])
-        for i in range(4):
-            q[k, i] = at[i]
+    angles, joints, axes = own.small[1], own.small[2:], own.axes
+    back = (1.0, 0.0, 0.0, 0.0)
+    if layout.mounted:
+        mount = (c[GAMMA], c[GAMMA + 1], c[GAMMA + 2])
+        back, j = exp((-mount[0], -mount[1], -mount[2])), right_jacobian(mount)
         for i in range(3):
-            acc[k, i] = read[i]
+            at = layout.mount[i]
+            if at >= 0:
+                axes[at, 0], axes[at, 1], axes[at, 2] = j[0][i], j[1][i], j[2][i]
+    for link in range(len(layout.links) - 1, -1, -1):
+        axis, joint = world.axes[layout.links[link, 0]], layout.links[link, 1]
+        slot, at = layout.links[link, 2], layout.links[link, 3]
+        if joint >= 0:
+            about = rotate(back, unit(axis, world.signs[joint]))
+            joints[joint, 0], joints[joint, 1], joints[joint, 2] = about
+            back = multiply(back, elementary(axis, -world.signs[joint] * angles[joint]))
+        else:
+            about = rotate(back, unit(axis, 1.0))
+            if at >= 0:
+                axes[at, 0], axes[at, 1], axes[at, 2] = about
+            back = multiply(back, elementary(axis, -c[slot]))
+    return back
+
+
+@merged
+def bending(f: Vector, c: Array) -> Quaternion:
+    """Turn (4,) of the sensors on a platform that specific force ``f`` (3,) in p bends: qexp(sag x f)."""
+    return exp(cross((c[SAG], c[SAG + 1], c[SAG + 2]), f))
+
+
+@merged
+def encoders(
+    th: Vector | Array, read: Rates, base: Base, c: Array, layout: Layout, world: World, own: Room
+) -> Quaternion:
+    """Attitude (4,) of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc; its columns,
+    of the places ``layout.columns``, in ``own.axes``.
+
+    Turns of p by sag, and within a delay, of some 1e-4, are left out of the axes of what is before them.
+    """
+    joints, axes, terms, first = own.small[2:], own.axes, layout.terms, layout.until[2]
+    joint_angles(th, c, layout, own)
+    q = chain(c, layout, world, own)
+    for a in range(first, layout.until[3]):
+        at = terms[a, ENTRY]
+        for i in range(3 if at >= 0 else 0):
+            axes[at, i] = -own.quantities[a - first] * joints[terms[a, AXIS], i]
+    q = (q[0], -q[1], -q[2], -q[3])
+    if layout.bent:
+        f = specific_force(q, base.up)
+        for i in range(3):
+            at = layout.bend[i]
+            if at >= 0:
+                axes[at, 0], axes[at, 1], axes[at, 2] = cross(unit(i, 1.0), f)
+        q = multiply(q, bending(f, c))
+    if layout.late_encoders:
+        rate, tau = turning(rate_at(read, c[TAU]), STILL, 0.0, c, layout, own), c[TAU]
+        of_earth = specific_force(q, base.earth)
+        over = (rate[0] - of_earth[0], rate[1] - of_earth[1], rate[2] - of_earth[2])
+        by = about_turning(over, th, layout.turning, world.axes, world.signs)
+        if layout.late[0] >= 0:
+            axes[layout.late[0], 0], axes[layout.late[0], 1], axes[layout.late[0], 2] = by
+        if layout.turning.all():
+            return propagate(q, rate, base.earth, tau)
+        q = multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
+    return q
+
+
+@merged
+def accelerometers(
+    q: Quaternion, read: Rates, warm: float, base: Base, c: Array, layout: Layout, own: Room
+) -> tuple[Vector, Vector]:
+    """Outputs (3,) [m/s^2] at a row of attitude ``q`` of accelerometers late by tau_a, and the specific force (3,)
+    [m/s^2] in p that they sense; their rows, of the places ``layout.rows``, in ``own.entries``."""
+    rate, over = STILL, STILL
+    if layout.moving:
+        late = c[TAU + 1]
+        rate = turning(rate_at(read, late), STILL, 0.0, c, layout, own)
+        q = propagate(q, rate, base.earth, -late)
+        v = specific_force(q, base.earth)
+        over = (rate[0] - v[0], rate[1] - v[1], rate[2] - v[2])
+    return sensed(q, rate, over, warm, base, c, layout, own)
+
+
+@kernel
+def output_quantities(s: Vector, by: Vector, warm: float) -> tuple[float, ...]:
+    """Quantities of the outputs, in the order of `QUANTITIES`: ``s`` (3,) [m/s^2] are outputs without bias, ``by`` the
+    same over their scales; as plain Python it also takes arrays."""
+    return s[0] * by[0], s[1] * by[1], s[2] * by[2], warm, warm * by[0], warm * by[1], warm * by[2], 1.0
+
+
+@merged
+def sensed(
+    q: Quaternion, rate: Vector, over: Vector, warm: float, base: Base, c: Array, layout: Layout, own: Room
+) -> tuple[Vector, Vector]:
+    """`accelerometers` of a platform that has attitude ``q`` when they read, and turns then at ``rate`` (3,) [rad/s]
+    against inertial space, ``over`` (3,) [rad/s] the base.
+
+    What of an output is not linear in the signal, K2 and by temperature, is left out of derivatives by others.
+    """
+    out, entries, terms, until = own.small[0], own.entries, layout.terms, layout.until
+    f = specific_force(q, base.up)
+    gx, gy, gz = 1.0 + c[15], 1.0 + c[16], 1.0 + c[17]
+    gains = ((gx, 0.0, 0.0), (-c[4], gy, 0.0), (c[3], -c[5], gz))  # of the specific force, by accelerometer
+    square = rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
+    out[0], out[1], out[2] = f
+    for a in range(until[0], until[1]):
+        i, k = terms[a, AXIS], terms[a, QUANTITY] % 3
+        v = rate[i] * rate[k] - (square if i == k else 0.0)
+        out[i] += c[terms[a, SLOT]] * v
+        if terms[a, ENTRY] >= 0:
+            entries[i, terms[a, ENTRY]] = v * gains[i][i]
+    x, y, z = out[0], out[1], out[2]
+    for i in range(3):
+        entries[i, 3], entries[i, 4] = 1.0, out[i]
+    entries[1, 5], entries[2, 5], entries[2, 6] = -x, x, -y
+    sx, sy, sz = gx * x, gy * y - c[4] * x, gz * z + c[3] * x - c[5] * y
+    out[0], out[1], out[2] = c[12] + sx, c[13] + sy, c[14] + sz
+    if until[2] > until[1]:
+        quantities, made = own.quantities, output_quantities((sx, sy, sz), (sx / gx, sy / gy, sz / gz), warm)
+        for k in range(len(made)):
+            quantities[k] = made[k]
+        for a in range(until[1], until[2]):
+            i, by = terms[a, AXIS], quantities[terms[a, QUANTITY]]
+            out[i] += c[terms[a, SLOT]] * by
+            if terms[a, ENTRY] >= 0:
+                entries[i, terms[a, ENTRY]] = by
+    turned = turned_by_beta(base.up, q, c) if layout.based else (STILL, STILL, STILL)
+    for i in range(3):
+        g, behind = gains[i], layout.begin[i]
+        turn = cross(g, f)  # g . (f x dtheta) = (g x f) . dtheta
+        entries[i, 0], entries[i, 1], entries[i, 2] = turn
+        if layout.late[1] >= 0:
+            entries[i, behind + layout.late[1]] = -(turn[0] * over[0] + turn[1] * over[1] + turn[2] * over[2])
+        for j in range(3):
+            if layout.base[j] >= 0:
+                d = turned[j]
+                entries[i, behind + layout.base[j]] = g[0] * d[0] + g[1] * d[1] + g[2] * d[2]
+    return (out[0], out[1], out[2]), f

@@ -2,10 +2,9 @@
 
 A platform is described by one array of all parameters, the *full vector* (K,), in the order of `ALL`: the 24 of
 `inercal.selfcal.platform.coefficients`, in the linear form, then those of the rig. An estimator has some of them as
-states; the others stay at the values that the study states, 0 if it is silent. Kernels take the full vector no longer
-than it is needed: 18, 24 or K numbers.
+states; the others stay at the values that the study states, 0 if it is silent.
 
-`inercal.selfcal.platform.model` is what each state does, `inercal.selfcal.platform.linearised` its derivative.
+What each state does, and its derivative, is `inercal.selfcal.platform.model`.
 """
 
 from __future__ import annotations
@@ -20,17 +19,20 @@ from numpy.typing import NDArray
 
 from inercal.arrays import Array
 from inercal.instruments.terms import term
+from inercal.selfcal.platform.layout import Entry, Layout, by_axis, entries, layout_of
 
 
 class State(NamedTuple):
     """States of one kind: their ``parameters``, ``dimension`` of a quantity, usual ``prior``, an ``example``, the
-    meaning in ``words``, the ``key`` of a study, and the ``source`` of the equation."""
+    meaning in ``words``, where it ``enters`` the model (`inercal.selfcal.platform.layout.entries`), the ``key`` of a
+    study, and the ``source`` of the equation."""
 
     parameters: tuple[str, ...]
     dimension: str
     prior: str
     example: str
     words: str
+    enters: str
     key: str = ""
     source: str = ""
 
@@ -56,88 +58,92 @@ _WARM = "IEEE Std 952 and 1293: coefficients of temperature"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
 STATES: Final[Mapping[str, State]] = {
-    "kg0": State(_by_axis("kg0"), "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases"),
+    "kg0": State(_by_axis("kg0"), "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases", "core"),
     "eta": State(
         ("eta_pz", "eta_oy", "eta_oz"), "angle", "300 arcsec", "60 arcsec",
-        "misalignments eta of accelerometers, pz, oy, oz",
+        "misalignments eta of accelerometers, pz, oy, oz", "core",
     ),
-    "ds": State(_by_axis("ds"), "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros"),
-    "do": State(_by_axis("do"), "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros"),
-    "ka0": State(_by_axis("ka0"), "acceleration", "500 ug", "100 ug", "accelerometer biases"),
-    "ka1": State(_by_axis("ka1"), "number", "1500 ppm", "500 ppm", "accelerometer scale errors"),
+    "ds": State(_by_axis("ds"), "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros", "core"),
+    "do": State(_by_axis("do"), "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros", "core"),
+    "ka0": State(_by_axis("ka0"), "acceleration", "500 ug", "100 ug", "accelerometer biases", "core"),
+    "ka1": State(_by_axis("ka1"), "number", "1500 ppm", "500 ppm", "accelerometer scale errors", "core"),
     "kg1": State(
-        _by_axis("kg1"), "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model"
+        _by_axis("kg1"), "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model",
+        by_axis("rate", "w_*"),
     ),
     "beta": State(
         _by_axis("beta"), "angle", "60 arcsec", "5 arcsec",
-        "the encoders' zero, in the extended model",
+        "the encoders' zero, in the extended model", "base",
     ),
     "gamma": State(
         _by_axis("gamma"), "angle", "20 arcsec", "0(20) arcsec",
-        "turn of the sensors' axes p against the last gimbal, about the axes of p", "gamma", _CHAIN,
+        "turn of the sensors' axes p against the last gimbal, about the axes of p", "mount", "gamma", _CHAIN,
     ),
     "non_orthogonality": State(
         ("nonorth_xy", "nonorth_yz"), "angle", "20 arcsec", "0(20) arcsec",
         "inner axis against the outer, turned about the last at zero angles; last axis against the inner, turned "
-        "about the outer", "non_orthogonality", _CHAIN,
+        "about the outer", "link", "non_orthogonality", _CHAIN,
     ),
     "zero_y": State(
         ("zero_y",), "angle", "20 arcsec", "0(20) arcsec",
-        "reading of the inner encoder where the joint is at zero", "zero_y", _CHAIN,
+        "reading of the inner encoder where the joint is at zero", "angle y 1", "zero_y", _CHAIN,
     ),
     "delay": State(
         ("tau_enc", "tau_a"), "time", "5 ms", "0(5) ms",
-        "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", _DELAY,
+        "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", "delay",
+        _DELAY,
     ),
     "k2": State(
         _by_axis("K2"), "quadratic", "20 ug/g^2", "0(20) ug/g^2",
-        "second-order coefficients of accelerometers", "k2", _IEEE_1293,
+        "second-order coefficients of accelerometers", by_axis("output", "s2_*"), "k2", _IEEE_1293,
     ),
     "levers": State(
         tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "length", "50 mm", "0(50) mm",
-        "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z", "levers",
+        "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z",
+        "force " + ", ".join(f"{i} ww_{i}{j}" for i in "xyz" for j in "xyz"), "levers",
         "centripetal acceleration w x (w x r) of textbooks on mechanics",
     ),
     "scale_asymmetry": State(
         _by_axis("S_asym"), "number", "10 ppm", "0(10) ppm",
-        "gyro scale for positive rates less that for negative ones", "scale_asymmetry",
+        "gyro scale for positive rates less that for negative ones", by_axis("rate", "|w_*|/2"), "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
     "g_sensitivity": State(
         tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "rate by force", "0.02 deg/h/g",
-        "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z", "g_sensitivity",
+        "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z",
+        "rate " + ", ".join(f"{i} f_{j}" for i in "xyz" for j in "xyz"), "g_sensitivity",
         "IEEE Std 952: acceleration-sensitive drift",
     ),
     "sag": State(
         _by_axis("sag"), "angle by force", "2 arcsec/g", "0(2) arcsec/g",
         "elastic turn of the sensors on the platform per specific force, by a mass off the centre along x, y, z",
-        "sag", "Hooke's law",
+        "bend", "sag", "Hooke's law",
     ),
     "kg0_T1": State(
         tuple(f"kg0_{i}_T1" for i in "xyz"), "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
-        "gyro biases per kelvin", "kg0_T1", _WARM,
+        "gyro biases per kelvin", by_axis("rate", "warm"), "kg0_T1", _WARM,
     ),
     "ka0_T1": State(
         tuple(f"ka0_{i}_T1" for i in "xyz"), "acceleration by temperature", "50 ug/K", "0(50) ug/K",
-        "accelerometer biases per kelvin", "ka0_T1", _WARM,
+        "accelerometer biases per kelvin", by_axis("output", "warm"), "ka0_T1", _WARM,
     ),
     "ka1_T1": State(
         tuple(f"ka1_{i}_T1" for i in "xyz"), "number by temperature", "20 ppm/K", "0(20) ppm/K",
-        "accelerometer scale errors per kelvin", "ka1_T1", _WARM,
+        "accelerometer scale errors per kelvin", by_axis("output", "warm_*"), "ka1_T1", _WARM,
     ),
     "harmonics": State(
         tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "angle", "5 arcsec",
         "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
-        "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "harmonics",
+        "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "waves", "harmonics",
         "eccentric and elliptic circles of textbooks on surveying instruments",
     ),
     "gyro_walk": State(
         _by_axis("kg0_walk"), "rate", "0.0005 deg/h", "0.0005 deg/h",
-        "gyro biases at the last row, less their means kg0", source=_MARKOV,
+        "gyro biases at the last row, less their means kg0", by_axis("rate", "1"), source=_MARKOV,
     ),
     "accelerometer_walk": State(
         _by_axis("ka0_walk"), "acceleration", "1.9 ug", "1.9 ug",
-        "accelerometer biases at the last row, less their means ka0", source=_MARKOV,
+        "accelerometer biases at the last row, less their means ka0", by_axis("output", "1"), source=_MARKOV,
     ),
 }  # fmt: skip
 """Name of a kind -> its states; the first six are the paper's, the next two the extended model's. The last two change
@@ -175,33 +181,25 @@ USUAL_WAVES: Final = tuple((joint, order) for joint in range(3) for order in (1,
 
 MOST_WAVES: Final = len(STATES["harmonics"].parameters) // 2
 
+RIG_BEGINS: Final = ALL.index("gamma_x")
+"""Place in the full vector from which on parameters are those of the rig."""
+
+BETA: Final = ALL.index("beta_x")
 GAMMA: Final = ALL.index("gamma_x")
-NONORTH: Final = ALL.index("nonorth_xy")
-ZERO_Y: Final = ALL.index("zero_y")
 TAU: Final = ALL.index("tau_enc")
-K2: Final = ALL.index("K2_x")
 LEVER: Final = ALL.index("r_xx")
-ASYM: Final = ALL.index("S_asym_x")
-BY_FORCE: Final = ALL.index("G_xx")
 SAG: Final = ALL.index("sag_x")
-WARM: Final = ALL.index("kg0_x_T1")
 WAVE: Final = ALL.index("harmonic_1_sin")
 WALK: Final = ALL.index("kg0_walk_x")
-"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; by temperature
-kg0, ka0, ka1; of harmonics a sine and a cosine of each; of walks gyros, accelerometers."""
+"""Place of each kind in the full vector, as kernels take it; of delays encoder, accelerometer; of harmonics a sine and
+a cosine of each; of walks gyros, accelerometers."""
 
-
-class Layout(NamedTuple):
-    """States as kernels take them: ``chosen`` (p,) their places in the full vector; ``place`` (K,) of each parameter
-    in the error state, -1 where it is no state; ``stated`` (18, 24 or K,) the full vector without the states; ``waves``
-    (m, 2) joint and order of the harmonics, none where they are no states and stated as 0; ``turning`` (3,) true of
-    joints that are not fixed."""
-
-    chosen: NDArray[np.int64]
-    place: NDArray[np.int64]
-    stated: Array
-    waves: NDArray[np.int64]
-    turning: NDArray[np.bool_]
+ENTRY_OF: Final[Mapping[str, Entry]] = {
+    name: entry
+    for state in STATES.values()
+    for name, entry in zip(state.parameters, entries(state.enters, len(state.parameters)), strict=True)
+}
+"""The entry of each parameter of the full vector."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,19 +220,10 @@ class StateVector:
     @cached_property
     def layout(self) -> Layout:
         """The same for kernels."""
-        index, place = self.index, np.full(len(ALL), -1, dtype=np.int64)
-        place[index] = 3 + np.arange(len(index))
-        longest = max(int(index.max(initial=-1)), int(np.flatnonzero(self.stated).max(initial=-1)))
-        size = next(size for size in (18, 24, len(ALL)) if longest < size)
-        slots = slice(WAVE, WAVE + 2 * len(self.harmonics))
-        used = (place[slots] >= 0).any() or self.stated[slots].any()
-        waves = np.array(self.harmonics if used else (), dtype=np.int64).reshape(-1, 2)
-        return Layout(
-            index, place, self.stated[:size].copy(), waves, np.isin(np.arange(3), self.fixed, invert=True)
-        )
+        return layout_of(tuple(ENTRY_OF.values()), self.index, self.stated, self.harmonics, self.fixed, WALK)
 
     def full(self, c: Array) -> Array:
-        """The full vector (18, 24 or K,) of states ``c`` (p,), linear form."""
+        """The full vector (K,) of states ``c`` (p,), linear form."""
         whole = self.layout.stated.copy()
         whole[self.layout.chosen] = c
         return whole
@@ -252,7 +241,7 @@ class StateVector:
     @property
     def of_rig(self) -> bool:
         """True where there are states of the rig, or stated values of them."""
-        return len(self.layout.stated) > 24
+        return bool((self.index >= RIG_BEGINS).any() or self.stated[RIG_BEGINS:].any())
 
     def has(self, kind: str) -> bool:
         """True where all parameters of a kind are states."""
