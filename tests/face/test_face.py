@@ -222,7 +222,7 @@ def test_arrays_become_a_record():
         (lambda: ic.calibrate(ic.record(acc_x=[1.0], rate=1.0)), 'latitude="48 deg"'),
         (
             lambda: ic.design(ic.study("imu", latitude="1 deg")),
-            "expected one of turntable, selfcal, strapdown or aoa",
+            "expected one of strapdown, turntable, selfcal or aoa",
         ),
         (lambda: ic.design(ic.study("turntable", **TABLE), "selfcal"), "expected 'positions'"),
         (
