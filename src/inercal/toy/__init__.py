@@ -1,0 +1,1 @@
+"""A toy: one number from the mean of a channel."""
