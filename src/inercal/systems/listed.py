@@ -9,7 +9,6 @@ from inercal.imu.system import SYSTEM as IMU
 from inercal.selfcal.system import SYSTEM as SELFCAL
 from inercal.strapdown.system import SYSTEM as STRAPDOWN
 from inercal.systems.contract import System
-from inercal.toy.system import SYSTEM as TOY
 from inercal.turntable.system import SYSTEM as TURNTABLE
 
 SYSTEMS: Mapping[str, System] = {
@@ -20,7 +19,6 @@ SYSTEMS: Mapping[str, System] = {
         TURNTABLE,
         SELFCAL,
         AOA,
-        TOY,
     )
 }
 """Systems by the kind of their studies."""

@@ -1,1 +1,0 @@
-"""A toy: one number from the mean of a channel."""
