@@ -25,7 +25,7 @@ from inercal.studies.text import parsed, with_keys
 from inercal.systems.listed import SYSTEMS
 from inercal.workbench.plans import lines_of, named, with_lines
 
-pytestmark = pytest.mark.usefixtures("undrawn")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("undrawn")]
 
 #: keys that make the test of a new study short
 SHORT = {
