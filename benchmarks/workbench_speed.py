@@ -22,9 +22,11 @@ from measure import PROCESSOR, WALL, Row, Spread, alone, in_turn, row
 from inercal.examples import FOLDER
 from inercal.face.foresight import course, foresight
 from inercal.face.study import read_study
+from inercal.studies.text import with_keys
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.bench import Bench, open_bench
 from inercal.workbench.charts import figure
-from inercal.workbench.plans import KINDS, with_keys
+from inercal.workbench.plans import named
 from inercal.workbench.sessions import STUDY
 
 PLANS = {
@@ -96,7 +98,7 @@ def sliders(folder: Path, rounds: int) -> list[Row]:
     for kind, name in PLANS.items():
         text = (FOLDER / name).read_text()
         if kind == "strapdown":
-            text = with_keys(text, KINDS[kind].named["19 positions"])
+            text = with_keys(text, named(SYSTEMS[kind].plan)["19 positions"])
         path = folder / f"{kind}.toml"
         path.write_text(text)
         study = read_study(kind, path)

@@ -32,6 +32,7 @@ FLOORS = [
     {"sensitivities"},
     {"designs"},
     {"imu", "strapdown", "turntable", "selfcal", "aoa"},
+    {"systems"},
     {"convert"},
     {"studies"},
     {"report"},
@@ -44,6 +45,14 @@ FLOORS = [
     {"cli", "workbench", "__main__"},
 ]
 SYSTEMS = {"imu", "strapdown", "turntable", "selfcal", "aoa"}
+#: modules of a system that stand on the floor of a room above
+LIFTED = {
+    "figures": "report",
+    "study": "studies",
+    "stream": "stream",
+    "validation": "validate",
+    "verbs": "face",
+}
 FLOOR_OF = {room: level for level, floor in enumerate(FLOORS) for room in floor}
 SOURCES = {
     ".".join(("inercal", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"): path
@@ -91,16 +100,25 @@ def room(module):
     return [*module.split("."), ""][1]
 
 
-def is_figures(module):
-    """Figures of a system: drawn on top of the report, so a face."""
-    return room(module) in SYSTEMS and "figures" in module.split(".")
+def lifted(module):
+    """The part of a system that stands on the floor of a room above, as ``figures``; empty for any other."""
+    if room(module) not in SYSTEMS:
+        return ""
+    return next((part for part in module.split(".")[2:] if part in LIFTED), "")
+
+
+def is_record(module):
+    """The record of what a system offers: its functions import from any floor, when somebody of that floor asks."""
+    return room(module) in SYSTEMS and module.split(".")[2:] == ["system"]
 
 
 def floor(module):
     """Level of a module; the package itself, which only defines words, is the ground."""
     if module == "inercal":
         return -1
-    return FLOOR_OF["report"] if is_figures(module) else FLOOR_OF[room(module)]
+    if is_record(module):
+        return FLOOR_OF["systems"]
+    return FLOOR_OF[LIFTED.get(lifted(module), room(module))]
 
 
 MODULES = sorted(SOURCES)
@@ -112,7 +130,7 @@ def test_every_room_has_a_floor():
 
 def wrong_imports(module):
     """What a module imports against the plan."""
-    for other in sorted(imports(module)):
+    for other in sorted(imports(module, functions=not is_record(module))):
         if other.split(".")[0] != "inercal":
             continue
         if other not in SOURCES:
@@ -120,17 +138,28 @@ def wrong_imports(module):
             continue
         if floor(other) > floor(module):
             yield f"{module} imports {other}, which is on a floor above"
-        if len({room(module), room(other)} & SYSTEMS) > 1:
-            yield f"{module} imports {other}: one system knows another"
+        if is_record(other) and room(module) in SYSTEMS:
+            yield f"{module} imports {other}: a record is for the rooms above"
         of_task = other.endswith(".task") and room(other) in SYSTEMS
         if of_task and room(module) not in ("cli", "face", "validate", room(other)):
             yield f"{module} imports {other}: only the faces and the validation run tasks"
-        if is_figures(other) and room(module) not in ("cli", "face") and not is_figures(module):
+        asks = room(module) in ("cli", "face") or lifted(module) in ("figures", "verbs")
+        if lifted(other) == "figures" and not asks:
             yield f"{module} imports {other}: only the faces ask for figures"
 
 
 def test_imports_come_from_below():
     assert [wrong for module in MODULES for wrong in wrong_imports(module)] == []
+
+
+def test_one_system_does_not_know_another():
+    crossed = [
+        f"{module} imports {other}"
+        for module in MODULES
+        for other in imports(module)
+        if len({room(module), room(other)} & SYSTEMS) > 1
+    ]
+    assert crossed == []
 
 
 def test_records_stand_on_their_own():
@@ -154,23 +183,24 @@ def test_no_circles():
 WITHIN = {
     "imu": (
         "limits identified rest recording rows turns settings second_order simulate multiposition means known_rates "
-        "known_turns ferraris aided temperature task figures"
+        "known_turns ferraris aided temperature task figures verbs system"
     ),
     "strapdown": (
         "limits coefficients settings kernels delay samples arrow simulate rests start batch error_state bounds "
-        "path_search design foresight left_out considered restricted averaged budget reading outcome task figures"
+        "path_search design foresight left_out considered restricted averaged budget reading outcome task figures "
+        "verbs system"
     ),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
-        "positions rate steps task figures"
+        "positions rate steps task figures verbs system"
     ),
     "aoa": (
         "estimators limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis "
-        "reference result simulate design foresight estimation task runs figures"
+        "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (
         "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
-        "result task several figures"
+        "result task several figures verbs system"
     ),
 }
 
@@ -188,8 +218,12 @@ def all_imports(module):
 
 def test_no_circles_of_any_kind():
     """Also none through imports for type checking alone, or inside functions."""
-    lazy = "inercal"  # its own names are resolved when asked for
-    graph = {module: set(all_imports(module)) - {module} for module in MODULES if module != lazy}
+    lazy = "inercal"  # its own names are resolved when asked for, as are those of the record of a system
+    graph = {
+        module: set(all_imports(module)) - {module}
+        for module in MODULES
+        if module != lazy and not is_record(module) and module != "inercal.systems.contract"
+    }
     graphlib.TopologicalSorter(graph).prepare()
 
 
@@ -379,6 +413,97 @@ def prints(node):
         case ast.Call(func=ast.Attribute() as function):
             return "sys.stdout" in ast.unparse(function)
     return False
+
+
+def offers():
+    """What the records of systems offer by a function that imports it: name -> floor, the highest of any system."""
+    highest = {}
+    for module in filter(is_record, MODULES):
+        needs = {
+            node.name: [
+                floor(each.module)
+                for each in ast.walk(node)
+                if isinstance(each, ast.ImportFrom) and each.module.startswith("inercal")
+            ]
+            for node in TREES[module].body
+            if isinstance(node, ast.FunctionDef)
+        }
+        for node in ast.walk(TREES[module]):
+            if isinstance(node, ast.keyword) and isinstance(node.value, ast.Name):
+                levels = [*needs.get(node.value.id, ()), highest.get(node.arg, -1)]
+                highest[node.arg] = max(levels)
+    return highest
+
+
+def read_of_a_system(tree):
+    """Attributes of ``system``, of ``study.system``, of ``SYSTEMS[kind]``."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            match node.value:
+                case (
+                    ast.Name(id="system")
+                    | ast.Attribute(attr="system")
+                    | ast.Subscript(value=ast.Name(id="SYSTEMS") | ast.Attribute(attr="SYSTEMS"))
+                ):
+                    yield node.attr
+
+
+def test_of_a_system_a_room_reads_what_is_on_its_floor():
+    """A record is no back stair: studies read a study by it, validation its cases, faces and those above the rest."""
+    offered = offers()
+    assert offered["calibrate"] > offered["cases"] > offered["read_study"] > offered["foresight"]
+    up = [
+        f"{module} reads {name}"
+        for module in MODULES
+        for name in read_of_a_system(TREES[module])
+        if offered.get(name, -1) > floor(module)
+    ]
+    assert up == []
+
+
+def is_constant(node):
+    """True for a text as it stands, or for the choice between two."""
+    match node:
+        case ast.IfExp(body=first, orelse=second):
+            return is_constant(first) and is_constant(second)
+    return isinstance(node, ast.Constant)
+
+
+def test_no_module_is_imported_by_a_name_made_of_text():
+    """An editor follows a system by its record, from the verb to the fit."""
+    known = {
+        "inercal",  # its public names
+        "inercal.records.read",  # formats of files
+    }
+    made = [
+        module
+        for module, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).split(".")[-1] in ("import_module", "__import__")
+        if not is_constant(node.args[0])
+    ]
+    assert {*made} - known == set()
+
+
+def test_kinds_of_study_are_named_by_their_systems():
+    """A table of kinds outside their rooms would be one more place to visit with a new system."""
+    kinds = set(SYSTEMS)
+    known = {
+        "inercal.cli.tree",  # the text of help
+        "inercal.examples",  # their names and commands
+        "inercal.estimate.shown",  # on a floor below the systems
+        "inercal.validate.case",  # names of examples
+    }
+    tables = [
+        f"{module}, line {node.lineno}"
+        for module, tree in TREES.items()
+        if room(module) not in kinds and module not in known
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Dict | ast.Tuple | ast.List | ast.Set | ast.Match | ast.Compare)
+        if len({each.value for each in ast.walk(node) if isinstance(each, ast.Constant)} & kinds) > 1
+    ]
+    assert tables == []
 
 
 def test_only_the_command_line_prints():

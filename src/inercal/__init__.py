@@ -71,6 +71,7 @@ Map, lower floors first; each imports only from those above its own line
                                before (bounds, observability, path_design, simulate), diagnosis, result, task
     aoa                        layout, motion, simulate; reading, fusion (model, loop, smoother), paper (static, lever,
                                frequency), reference, diagnosis, result, task
+    systems                    contract (what a system offers), listed (all of them)
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
     studies, report, examples  files people write; pages people read; recordings that ship
     stream                     line in, line out; state saved and resumed

@@ -103,7 +103,10 @@ def test_a_replay_keeps_the_time_of_its_stamps(folder, monkeypatch, capsys):
         ("live replay:imu.csv --study imu.toml --apply cal.json", "--study, --apply: found both"),
         ("live replay:imu.csv --apply cal.json --set a=b", "--set: found with --apply"),
         ("live imu.csv --study imu.toml", "found no known kind of address"),
-        ("live replay:imu.csv --study turntable.toml", "is of the kind turntable, expected aoa, selfcal"),
+        (
+            "live replay:imu.csv --study turntable.toml",
+            "is of the kind turntable, expected imu, strapdown, selfcal or aoa",
+        ),
         ("live replay:imu.csv --study none.toml", "none.toml: "),
         ("live replay:none.csv --study imu.toml", "none.csv: cannot be read (No such file or directory)"),
         ("live replay:imu.csv --study imu.toml --record imu.csv", "imu.csv: found it for two things"),

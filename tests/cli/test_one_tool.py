@@ -9,7 +9,7 @@ from functools import partial
 from itertools import pairwise
 
 import pytest
-from new_studies import FILL, filled
+from new_studies import FILL, filled, load_turntable_study
 
 from inercal.cli import run
 from inercal.cli.package import script
@@ -21,7 +21,6 @@ from inercal.studies.load import (
     load_imu_study,
     load_selfcal_study,
     load_strapdown_study,
-    load_turntable_study,
 )
 
 pytestmark = pytest.mark.usefixtures("undrawn")

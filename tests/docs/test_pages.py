@@ -153,6 +153,8 @@ def test_a_page_runs_in_processes_of_their_own_too(folder, capsys):
 def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
     import tomllib
 
+    from new_studies import load_turntable_study
+
     from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.specification import specification_of
     from inercal.records.maps import read_map
@@ -161,7 +163,6 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
         load_imu_study,
         load_selfcal_study,
         load_strapdown_study,
-        load_turntable_study,
     )
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]

@@ -11,8 +11,9 @@ from inercal.cli import run
 from inercal.estimate.cluster import Cluster
 from inercal.estimate.executors import Processes, Threads, numbered
 from inercal.examples import FOLDER
-from inercal.face import selfcal, turntable
 from inercal.face.study import read_study
+from inercal.selfcal import verbs as selfcal
+from inercal.turntable import verbs as turntable
 
 TABLE = ic.study(
     "turntable",

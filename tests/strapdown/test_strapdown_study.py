@@ -4,11 +4,11 @@ import tomllib
 
 import numpy as np
 import pytest
-from new_studies import filled
+from new_studies import filled, load_turntable_study
 
 from inercal.errors import StudyError
 from inercal.strapdown.settings import ESTIMABLE
-from inercal.studies.load import load_imu_study, load_strapdown_study, load_turntable_study
+from inercal.studies.load import load_imu_study, load_strapdown_study
 from inercal.studies.strapdown import strapdown_study
 from rows import for_each
 

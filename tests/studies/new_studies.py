@@ -1,6 +1,10 @@
 """Studies as `inercal new` writes them, filled in: anywhere in the north."""
 
+from functools import partial
+
+from inercal.studies.load import load_study
 from inercal.studies.template import template
+from inercal.systems.listed import SYSTEMS
 
 SITE = ("site.latitude=45(26) deg", "site.height=0(300) m")
 
@@ -12,3 +16,7 @@ def filled(kind, *paths, overrides=(), **more):
 
 FILL = [each for key in SITE for each in ("--set", key)]
 """Options of `inercal new` that fill in a site."""
+
+
+load_turntable_study = partial(load_study, SYSTEMS["turntable"])
+"""Settings of the study of a turntable, as those of the other systems."""

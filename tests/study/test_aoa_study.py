@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
+from new_studies import load_turntable_study
 from sting_study import DEG, SCENARIOS, G, scenario
 from sting_text import CONTRACT, WRITTEN, calibrated, same, study
 
@@ -18,7 +19,6 @@ from inercal.studies.load import (
     load_aoa_study,
     load_imu_study,
     load_selfcal_study,
-    load_turntable_study,
 )
 from inercal.studies.schema import json_schema
 from rows import for_each

@@ -5,10 +5,9 @@ import re
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from new_studies import filled
+from new_studies import filled, load_turntable_study
 
 from inercal.errors import StudyError
-from inercal.studies.load import load_turntable_study
 from inercal.studies.turntable import turntable_study
 from inercal.turntable.settings import TurntableSettings
 from rows import for_each

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from new_studies import filled
+from new_studies import filled, load_turntable_study
 from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
@@ -25,7 +25,7 @@ from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
 from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, PAPER, RIG, STATES, TEMPERATURE
 from inercal.selfcal.settings import Gating
-from inercal.studies.load import load_imu_study, load_selfcal_study, load_turntable_study
+from inercal.studies.load import load_imu_study, load_selfcal_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
 

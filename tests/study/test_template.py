@@ -3,6 +3,7 @@
 import math
 import re
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,15 +13,16 @@ from sting_text import calibrated
 
 from inercal.errors import StudyError
 from inercal.rigs.tables import slots
-from inercal.studies import load as load_module
 from inercal.studies.aoa import aoa_study
 from inercal.studies.imu import imu_study
+from inercal.studies.load import load_study
 from inercal.studies.schema import json_schema
 from inercal.studies.selfcal import selfcal_study
 from inercal.studies.starting import PATHS, POSITIONS
 from inercal.studies.strapdown import strapdown_study
 from inercal.studies.template import template
 from inercal.studies.turntable import turntable_study
+from inercal.systems.listed import SYSTEMS
 from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
@@ -168,7 +170,7 @@ def test_the_options_of_a_method_load(method, tmp_path):
 def test_what_must_be_filled_in_is_named_in_one_sentence(kind, tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(template(kind).replace("# operator", 'date = "?"\n# operator'), encoding="utf-8")
-    load = getattr(load_module, f"load_{kind}_study")
+    load = partial(load_study, SYSTEMS[kind])
     with pytest.raises(StudyError) as refused:
         load(path)
     assert str(refused.value).removeprefix(f"{path}: ") == (

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from new_studies import load_turntable_study
 from numpy.testing import assert_allclose
 
 from inercal.errors import StudyError
@@ -15,7 +16,7 @@ from inercal.geometry.earth import gravity
 from inercal.rigs.chain import Scope
 from inercal.rigs.plans import grid, named
 from inercal.rigs.tables import slots
-from inercal.studies.load import files_of, load_imu_study, load_turntable_study
+from inercal.studies.load import files_of, load_imu_study
 from inercal.studies.turntable import turntable_study
 from inercal.units import STANDARD_GRAVITY
 from rows import for_each

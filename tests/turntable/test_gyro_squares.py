@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from new_studies import load_turntable_study
 from turntable_studies import DEG_H, GRAVITY, LATITUDE, references, study, u_without_doubts
 
 from inercal.convert.correction import apply_to
@@ -13,7 +14,6 @@ from inercal.findings import Status
 from inercal.geometry.earth import EARTH_RATE
 from inercal.records.record import record_of
 from inercal.rigs.plans import grid
-from inercal.studies.load import load_turntable_study
 from inercal.turntable.positions.calibration import calibrate_positions
 from inercal.turntable.settings import RateTest
 from inercal.turntable.task import simulate

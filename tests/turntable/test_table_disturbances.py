@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from new_studies import load_turntable_study
 from turntable_studies import DEG_H, LATITUDE, WHEEL, references, study, wheel_output
 
 from inercal.errors import StudyError
 from inercal.geometry.earth import EARTH_RATE
 from inercal.rigs.plans import grid
-from inercal.studies.load import load_turntable_study
 from inercal.turntable.positions.simulate import simulate
 from inercal.turntable.settings import Disturbances, RateTest
 from inercal.turntable.task import simulate as simulate_test

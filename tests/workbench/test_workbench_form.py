@@ -6,8 +6,8 @@ import pytest
 
 from inercal.studies.template import template
 from inercal.studies.text import changed
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.form import as_toml, problem, tables
-from inercal.workbench.sessions import COMMANDS
 
 
 def at(data, path):
@@ -16,7 +16,7 @@ def at(data, path):
     return data
 
 
-@pytest.mark.parametrize("kind", COMMANDS)
+@pytest.mark.parametrize("kind", SYSTEMS)
 def test_every_key_of_a_new_study_takes_its_example_and_leaves_the_others(kind):
     text = template(kind)
     keys = [key for table in tables(kind, text) for key in table.keys if key.example]

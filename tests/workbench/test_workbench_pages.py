@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from inercal.examples import EXAMPLES
-from inercal.workbench.bench import KINDS
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.jobs import State
 from rows import for_each
 
@@ -172,7 +172,7 @@ async def test_a_test_is_planned_from_its_kind_to_its_uncertainties(user, bench)
     await user.should_see("instrument.noise: 0.1 deg/h (10 times)", retries=20)
     after = {each.text for each in user.find(kind=ui.label).elements}
     assert len(after - before) > 5
-    assert KINDS[session.kind] in bench.sessions.get(session.id).title
+    assert SYSTEMS[session.kind].title in bench.sessions.get(session.id).title
 
 
 @pytest.mark.slow

@@ -8,7 +8,8 @@ from inercal.examples import FOLDER
 from inercal.face.foresight import verticals
 from inercal.face.study import read_study
 from inercal.studies.text import with_keys
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
+from inercal.systems.listed import SYSTEMS
+from inercal.workbench.plans import lines_of, named, with_found, with_lines
 
 FILES = {
     "turntable": "gyro.toml",
@@ -16,6 +17,8 @@ FILES = {
     "strapdown": "strapdown.toml",
     "aoa": "sting.toml",
 }
+
+PLANS = {kind: SYSTEMS[kind].plan for kind in FILES}
 
 
 @pytest.fixture
@@ -30,10 +33,10 @@ def study(tmp_path):
 @pytest.mark.parametrize("kind", FILES)
 def test_lines_of_a_plan_make_the_same_plan(kind, study):
     before = (FOLDER / FILES[kind]).read_text()
-    for keys in list(KINDS[kind].named.values()) or [{}]:
+    for keys in list(named(PLANS[kind]).values()) or [{}]:
         text = with_keys(before, keys)
         lines = lines_of(study(kind, text))
-        again = with_lines(kind, text, lines)
+        again = with_lines(PLANS[kind], text, lines)
         assert lines_of(study(kind, again)) == lines
         np.testing.assert_allclose(verticals(study(kind, text)), verticals(study(kind, again)), atol=1e-9)
 
@@ -41,8 +44,8 @@ def test_lines_of_a_plan_make_the_same_plan(kind, study):
 def test_a_line_that_is_none_is_refused_and_one_added_is_there(study):
     text = (FOLDER / "selfcal.toml").read_text()
     with pytest.raises(InputError, match="no line"):
-        with_lines("selfcal", text, " \n")
-    added = with_lines("selfcal", text, "z, 180 deg\nrest, 5 s\n\nx, -90 deg, 2 deg/s")
+        with_lines(PLANS["selfcal"], text, " \n")
+    added = with_lines(PLANS["selfcal"], text, "z, 180 deg\nrest, 5 s\n\nx, -90 deg, 2 deg/s")
     assert lines_of(study("selfcal", added)).splitlines() == [
         "z, 180 deg",
         "rest, 5 s",
@@ -50,16 +53,18 @@ def test_a_line_that_is_none_is_refused_and_one_added_is_there(study):
     ]
     text = (FOLDER / "sting.toml").read_text()
     with pytest.raises(InputError, match="name, axis, place"):
-        with_lines("aoa", text, "a1, +x")
-    fewer = with_lines("aoa", text, "a1, -z, -0.2 m\na2, +x, 0.3 m")
+        with_lines(PLANS["aoa"], text, "a1, +x")
+    fewer = with_lines(PLANS["aoa"], text, "a1, -z, -0.2 m\na2, +x, 0.3 m")
     assert study("aoa", fewer).settings.layout.names == ("a1", "a2")
 
 
 def test_what_a_search_wrote_becomes_the_plan(study):
     table = with_found(
-        "turntable", (FOLDER / "gyro.toml").read_text(), "phi1 [deg],phi2 [deg]\n0,90\n45,10\n"
+        PLANS["turntable"], (FOLDER / "gyro.toml").read_text(), "phi1 [deg],phi2 [deg]\n0,90\n45,10\n"
     )
     assert lines_of(study("turntable", table)) == "0, 90\n45, 10"
     found = '# found\n[plan]\nturns = [\n    ["x", "30 deg"],\n]\nrate = "2 deg/s"\n'
-    plan = study("selfcal", with_found("selfcal", (FOLDER / "selfcal.toml").read_text(), found)).settings.plan
+    plan = study(
+        "selfcal", with_found(PLANS["selfcal"], (FOLDER / "selfcal.toml").read_text(), found)
+    ).settings.plan
     np.testing.assert_allclose(np.degrees([plan.rate, plan.moves[0].angle]), [2.0, 30.0])

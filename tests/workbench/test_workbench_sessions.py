@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from inercal.errors import InputError
 from inercal.examples import EXAMPLES
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench import sessions as module
 from inercal.workbench.bench import open_bench
-from inercal.workbench.sessions import COMMANDS, MAP, STUDY, Sessions, receive, safe_name
+from inercal.workbench.sessions import MAP, STUDY, Sessions, receive, safe_name
 
 
 @pytest.fixture
@@ -111,7 +112,7 @@ def test_a_toml_file_is_the_map_or_the_study(sessions):
 
 
 def test_examples_begin_sessions_whose_commands_are_theirs(sessions, tmp_path):
-    words = {" ".join(command) for command in COMMANDS.values()}
+    words = {system.command for system in SYSTEMS.values()}
     for example in EXAMPLES.values():
         if example.verb in words:
             session = sessions.begin_with(example.name)

@@ -142,7 +142,7 @@ def aoa(
     paths = recorded("aoa", files, streaming, every)
 
     from inercal._jit import compiling
-    from inercal.face import aoa as system
+    from inercal.aoa import verbs as system
     from inercal.face.study import one_run, read_study
     from inercal.records.write import SUFFIXES
 
@@ -173,7 +173,7 @@ def _runs(
 ) -> int:
     """Measure the runs of a table."""
     from inercal._jit import compiling
-    from inercal.face import aoa as system
+    from inercal.aoa import verbs as system
     from inercal.face.study import read_study
     from inercal.records.maps import read_map
     from inercal.records.read import read

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -41,9 +40,7 @@ def calibrate_imu(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    from inercal.imu.task import in_rows
-
-    return _calibrated("imu", files, study, map_file, span, overrides, output, in_rows)
+    return _calibrated("imu", files, study, map_file, span, overrides, output)
 
 
 def calibrate_strapdown(
@@ -114,27 +111,24 @@ def _calibrated(
     span: Span,
     overrides: list[str] | None,
     output: ResultOutput,
-    in_rows: Callable[[Any], bool] = lambda _: False,
 ) -> int:
-    """Read study and records, calibrate, and hand over; ``in_rows`` of the settings: the rows need no times."""
-    from importlib import import_module
-
+    """Read study and records, calibrate, and hand over."""
     from inercal.face.study import read_study
 
     output.check(WHOLE, (*files, map_file, study))
     the_study = read_study(kind, study, overrides or ())
     output.spare(the_study.files)
     clock = time.perf_counter()
-    records = read_repeats(files, map_file, output, span, in_rows(the_study.settings))
+    records = read_repeats(files, map_file, output, span, the_study.system.counted(the_study.settings))
     read_s = time.perf_counter() - clock
-    system = import_module(f"inercal.face.{kind}")
-    if hasattr(system, "prepare"):
+    system = the_study.system
+    if system.prepare:
         from inercal._jit import compiling
 
         with compiling(kind, output.say):
-            system.prepare(the_study)
+            system.prepare(the_study, False)
     with working(output) as progress:
-        result = system.calibrate(records, the_study, progress=progress)
+        result = system.calibrate(records, the_study, False, progress)
     return give(result, output, read_s)
 
 
@@ -154,7 +148,7 @@ def temperature(
     """Fit what a sensor's output or its calibration does with temperature."""
     from dataclasses import replace
 
-    from inercal.face.imu import of_temperature
+    from inercal.imu.verbs import of_temperature
     from inercal.units import parse_quantity
 
     reference = parse_quantity(at, "temperature", "--at").value

@@ -37,7 +37,7 @@ def design_positions(
 ) -> int:
     """Find the positions of a turntable that calibrate best."""
     from inercal._files import write_text
-    from inercal.face import turntable as system
+    from inercal.turntable import verbs as system
 
     output.check((*WHOLE, ".csv"), (study,))
     place = place_of(workers, cluster)
@@ -60,7 +60,7 @@ def design_tolerances(
 ) -> int:
     """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
     from inercal._files import write_text
-    from inercal.face import turntable as system
+    from inercal.turntable import verbs as system
     from inercal.turntable.positions.tolerance_result import study_tables
 
     output.check((".json", ".toml"), (study,))
@@ -86,7 +86,7 @@ def design_selfcal(
     """Find the path on which a platform calibrates itself best."""
     from inercal._files import write_text
     from inercal._jit import compiling
-    from inercal.face import selfcal as system
+    from inercal.selfcal import verbs as system
 
     output.check((".json", ".toml"), (study,))
     place = place_of(workers, cluster)
@@ -112,7 +112,7 @@ def design_strapdown(
     """Say what the turns of a strapdown unit tell, and find better ones."""
     from inercal._files import write_text
     from inercal._jit import compiling
-    from inercal.face import strapdown as system
+    from inercal.strapdown import verbs as system
     from inercal.strapdown.design import study_table
 
     output.check((".json", ".toml"), (study,))
@@ -137,7 +137,7 @@ def design_aoa(
 ) -> int:
     """Say what the sensors of a model can tell of its angle, and other layouts beside."""
     from inercal._jit import compiling
-    from inercal.face import aoa as system
+    from inercal.aoa import verbs as system
 
     output.check(WHOLE, (study,))
     the_study, read_s = study_in("aoa", study, overrides, output)
@@ -177,7 +177,7 @@ def sensitivity(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say which error of a turntable matters."""
-    from inercal.face import turntable as system
+    from inercal.turntable import verbs as system
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))
     place = place_of(workers, cluster)

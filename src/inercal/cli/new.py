@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, Overrides
 from inercal.cli.outcome import emit
 from inercal.errors import InputError
-
-if TYPE_CHECKING:
-    from inercal.studies.template import Kind
 
 Rate = Annotated[
     str | None,
@@ -100,7 +97,7 @@ def new_lab(
     emit(without_coefficients("new lab", words, {"lab": str(path)}), words, output)
 
 
-def _new(kind: Kind, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
+def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
     from inercal._files import write_text
     from inercal.estimate.result import without_coefficients

@@ -65,9 +65,9 @@ def selfcal(
     paths = recorded("selfcal", files, streaming, every)
 
     from inercal._jit import compiling
-    from inercal.face import selfcal as system
     from inercal.face.study import read_study
     from inercal.records.write import SUFFIXES
+    from inercal.selfcal import verbs as system
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     of = read_study("selfcal", study, keys)

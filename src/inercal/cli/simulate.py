@@ -202,7 +202,7 @@ def _simulated(
     _check(study, seed, output)
     assert output.out is not None
     of = read_study(kind, study, overrides or ())
-    inputs = of.files_without("estimator" if kind == "aoa" else "")
+    inputs = of.files_without(of.system.unsimulated)
     output.spare(inputs)
     record = simulate(of, np.random.default_rng(seed))
     with reading(output, "writing") as progress:

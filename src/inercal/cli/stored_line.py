@@ -13,6 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from inercal.errors import InputError, plain
+from inercal.selfcal.system import SYSTEM as SELFCAL
+from inercal.systems.contract import System
+from inercal.systems.listed import SYSTEMS
+from inercal.turntable.system import SYSTEM as TURNTABLE
 from inercal.units import shown
 
 if TYPE_CHECKING:
@@ -21,23 +25,11 @@ if TYPE_CHECKING:
     from inercal.laboratory.again import LaidOut
 
 COMMANDS_AGAIN = {
-    "calibrate imu": "imu",
-    "calibrate strapdown": "strapdown",
-    "calibrate turntable": "turntable",
-    "selfcal": "selfcal",
-    "aoa": "aoa",
-    "allan": "",
-    "temperature": "",
-    "sensitivity": "turntable",
-    "design positions": "turntable",
-    "design tolerances": "turntable",
-    "design selfcal": "selfcal",
-    "design strapdown": "strapdown",
-    "design aoa": "aoa",
-    "simulate selfcal": "selfcal",
-    "compare": "",
-    "history": "",
-    "validate": "",
+    **{system.command: kind for kind, system in SYSTEMS.items()},
+    **{f"design {name}": kind for kind, system in SYSTEMS.items() for name in system.designs},
+    "sensitivity": TURNTABLE.kind,
+    "simulate selfcal": SELFCAL.kind,
+    **dict.fromkeys(("allan", "temperature", "compare", "history", "validate"), ""),
 }
 """Commands that make a result of files and nothing else, each with the kind of its study, empty without one."""
 
@@ -69,6 +61,11 @@ class StoredLine:
     command: str
     given: Mapping[str, tuple[Any, ...]]
 
+    @property
+    def _system(self) -> System | None:
+        """The system of its study, None without one."""
+        return SYSTEMS.get(COMMANDS_AGAIN[self.command])
+
     def use(self, name: str) -> Use:
         """The use of one of its options."""
         return _use(self.command, name)
@@ -94,7 +91,7 @@ class StoredLine:
         """Refuse a study, map or table that names a file elsewhere; raises `InputError`."""
         study, column_map, table = (
             self._file(laid, *names)
-            for names in (_STUDIES, ("--map",), ("--runs",) if self.command == "aoa" else ())
+            for names in (_STUDIES, ("--map",), ("--runs",) if self._system and self._system.runs else ())
         )
         for path in filter(None, (study, column_map, table)):
             laid.name_places(path)
@@ -112,8 +109,9 @@ class StoredLine:
 
         if study is not None:
             keys = [laid.moved(key) for key in self.given.get("--set", ())]
-            unread = "motion" if self.command == "aoa" else ""  # of its simulation alone
-            yield from of_study(COMMANDS_AGAIN[self.command], study, keys, unread)
+            assert self._system is not None
+            unread = self._system.unread if self.command == self._system.command else ""
+            yield from of_study(self._system, study, keys, unread)
         runs = [[Path(laid.place(str(file))) for file in self.given.get("FILES", ())]]
         if table is not None:
             from inercal.aoa.runs.run_table import read_runs_table

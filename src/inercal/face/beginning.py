@@ -7,13 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from inercal.imu.system import SYSTEM as IMU
+from inercal.systems.contract import System
+from inercal.systems.listed import SYSTEMS
+
 if TYPE_CHECKING:
-    from inercal.studies.template import Kind
     from inercal.units import Unit
 
 
 def begun(
-    kind: Kind,
+    kind: str,
     files: Sequence[Path],
     study: Path,
     map_file: Path,
@@ -27,46 +30,33 @@ def begun(
     """
     from inercal.studies.template import template
 
-    channels, column_map = _described(kind, files, rate)
+    channels, column_map = _described(SYSTEMS[kind], files, rate)
     named = None if column_map is None else map_file
     return template(kind, files, study, named, channels, overrides), column_map
 
 
-def kind_of_record(files: Sequence[Path]) -> Kind:
+def kind_of_record(files: Sequence[Path]) -> str:
     """The kind of study that recordings with canonical headers are for: that of an IMU where they do not tell."""
-    from inercal.records.channels import of_a_table
     from inercal.records.read import canonical_units
 
     channels = canonical_units(list(files)) or {}
-    if "th_x" in channels:
-        return "selfcal"
-    if "a1" in channels:
-        return "aoa"
-    return "turntable" if of_a_table(channels) and "acc_x" not in channels else "imu"
+    return next((kind for kind, system in SYSTEMS.items() if system.tells(channels)), IMU.kind)
 
 
 def _described(
-    kind: Kind, files: Sequence[Path], rate: str | None
+    system: System, files: Sequence[Path], rate: str | None
 ) -> tuple[Mapping[str, Unit | None], str | None]:
     """Channels of the recordings, with their units where known, and a map where the headers do not say these."""
-    from inercal.records.channels import of_a_table
     from inercal.records.guess import guess_map
     from inercal.records.read import canonical_units
 
     if not files:
         return {}, None
-    channels: Mapping[str, Unit | None] = {} if kind == "imu" else canonical_units(files) or {}
-    plain = {
-        "imu": False,
-        "strapdown": {"acc_x", "gyro_x"} <= channels.keys(),
-        "turntable": of_a_table(channels),
-        "selfcal": "th_x" in channels,
-        "aoa": "a1" in channels,
-    }
-    if plain[kind]:
+    channels = canonical_units(files) or {}
+    if system.complete(channels):
         return channels, None
-    column_map = guess_map(files, on_table=kind == "turntable", of_model=kind == "aoa", rate=rate)
-    return (dict.fromkeys(mapped(column_map)) if kind in ("imu", "turntable") else channels), column_map
+    column_map = guess_map(files, **system.guess, rate=rate)
+    return dict.fromkeys(mapped(column_map)), column_map
 
 
 def mapped(column_map: str) -> list[str]:

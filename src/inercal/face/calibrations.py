@@ -7,9 +7,10 @@ from pathlib import Path
 
 from inercal.errors import InputError
 from inercal.estimate.result import Estimate
-from inercal.face.result import Result, View
+from inercal.face.result import Result, View, loaded
 from inercal.findings import Finding
 from inercal.records.record import Record
+from inercal.systems.listed import SYSTEMS
 
 
 def of_comparison(estimate: Estimate, first: Estimate) -> Result:
@@ -150,17 +151,10 @@ def load(path: str | Path) -> Result:
     'ok'
     """
     estimate = read_estimate(path)
-    match estimate.command:
-        case "compare":
-            return of_comparison(estimate, estimate)
-        case "aoa":
-            from inercal.face.aoa import loaded as angles_loaded
-
-            return angles_loaded(estimate)
-        case _:
-            from inercal.face.imu import loaded
-
-            return loaded(estimate)
+    if estimate.command == "compare":
+        return of_comparison(estimate, estimate)
+    of_command = (system.loaded for system in SYSTEMS.values() if system.command == estimate.command)
+    return (next(of_command, None) or loaded)(estimate)
 
 
 def read_estimate(path: str | Path) -> Estimate:

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
 from inercal.arrays import Array
 from inercal.designs.foresight import Foresight
 from inercal.errors import StudyError
 from inercal.face.study import Study
+from inercal.systems.listed import SYSTEMS
 
-_WHERE = {
-    "turntable": "inercal.turntable.positions.foresight",
-    "selfcal": "inercal.selfcal.before.foresight",
-    "strapdown": "inercal.strapdown.foresight",
-    "aoa": "inercal.aoa.foresight",
-}
-
-PLANNED = tuple(_WHERE)
+PLANNED = tuple(kind for kind, system in SYSTEMS.items() if system.foresight)
 """Kinds of study that plan a test."""
 
 
 def foresight(study: Study) -> Foresight:
     """Uncertainties that the plan of a study makes expect. Raises `StudyError` for a study without one."""
-    found: Foresight = _asked(study, "foresight")
-    return found
+    if (found := study.system.foresight) is None:
+        raise _without_plan(study)
+    with study.at_fault():
+        return found(study.settings)
 
 
 def verticals(study: Study) -> Array:
@@ -32,13 +25,12 @@ def verticals(study: Study) -> Array:
 
     Raises `StudyError` for a study without a plan.
     """
-    found: Array = _asked(study, "verticals")
-    return found
-
-
-def _asked(study: Study, what: str) -> Any:
-    """The answer of the system of a study about its plan."""
-    if study.kind not in _WHERE:
-        raise StudyError(study.path or "study", f"found the kind {study.kind}, expected one with a plan")
+    if (found := study.system.verticals) is None:
+        raise _without_plan(study)
     with study.at_fault():
-        return getattr(import_module(_WHERE[study.kind]), what)(study.settings)
+        return found(study.settings)
+
+
+def _without_plan(study: Study) -> StudyError:
+    """The refusal of a study that plans no test."""
+    return StudyError(study.path or "study", f"found the kind {study.kind}, expected one with a plan")

@@ -86,12 +86,7 @@ def repeats(paths: Sequence[str | Path], study: Study, map: str | Path | None = 
     """
     from inercal.records.read import read_runs
 
-    counted = False
-    if study.kind == "imu":
-        from inercal.imu.task import in_rows
-
-        counted = in_rows(study.settings)
-    return read_runs(paths, map, counted=counted)
+    return read_runs(paths, map, counted=study.system.counted(study.settings))
 
 
 def record(

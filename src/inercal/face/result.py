@@ -290,3 +290,18 @@ def of_coefficients(
         page,
         values,
     )
+
+
+def loaded(estimate: Estimate, shown: Estimate | None = None) -> Result:
+    """A result that was saved, ``shown`` in other units than those of its kind."""
+    given = estimate.shown() if shown is None else shown
+
+    def page() -> str:
+        from inercal.report.coefficients import budget, correlation
+        from inercal.report.html import render
+
+        pictures = [correlation(given)] if len(estimate.names) > 1 else []
+        pictures += [budget(given)] if estimate.names and estimate.budget else []
+        return render(given, pictures, f"inercal {estimate.command}")
+
+    return Result(estimate, of_coefficients(given, page))

@@ -7,33 +7,24 @@ import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
 from inercal.errors import InputError, StudyError
 from inercal.estimate.result import Estimate, without_coefficients
+from inercal.imu.system import SYSTEM as IMU
 from inercal.records.places import counted_names
 from inercal.records.record import Record
 from inercal.studies.text import toml
+from inercal.systems.contract import System
+from inercal.systems.listed import SYSTEMS
+from inercal.turntable.system import SYSTEM as TURNTABLE
 
-KINDS = ("imu", "strapdown", "turntable", "selfcal", "aoa")
+KINDS = tuple(SYSTEMS)
 """The kinds of study, one for each system, as the commands name them."""
-
-_LOAD = {
-    "imu": "load_imu_study",
-    "strapdown": "load_strapdown_study",
-    "turntable": "load_turntable_study",
-    "selfcal": "load_selfcal_study",
-    "aoa": "load_aoa_study",
-}
-"""Reader of the file of each kind, in `inercal.studies.load`."""
 
 _SITE = ("latitude", "height", "gravity")
 """Keys of the table [site] that may stand alone."""
-
-_UNREAD = {"aoa": "motion"}
-"""Table of a study whose files are for its simulation alone."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,6 +40,11 @@ class Study:
     path: Path | None = None
 
     @property
+    def system(self) -> System:
+        """The system that the study is of."""
+        return SYSTEMS[self.kind]
+
+    @property
     def keys(self) -> Mapping[str, Any]:
         """The keys that were given, table by table, ready for JSON."""
         given: Mapping[str, Any] = self.settings.given
@@ -57,7 +53,7 @@ class Study:
     @property
     def files(self) -> tuple[Path, ...]:
         """The study, and the files that it names; none of a study by keywords."""
-        return self.files_without(_UNREAD.get(self.kind, ""))
+        return self.files_without(self.system.unread)
 
     def files_without(self, table: str) -> tuple[Path, ...]:
         """The study, and the files that it names outside that ``table``."""
@@ -100,8 +96,9 @@ def study(path_or_kind: str | Path, /, **keys: Any) -> Study:
         keywords.
     **keys
         Tables of the study with the keys of its file, quantities as texts with a unit: ``site={"latitude": "45 deg"}``.
-        ``latitude``, ``height`` and ``gravity`` may stand without their table ``site``, and of an IMU all keys of the
-        table ``imu``: ``method="ferraris"``. Beside a file, they are set over its keys.
+        ``latitude``, ``height`` and ``gravity`` may stand without their table ``site``, and of an IMU or a strapdown
+        unit all keys of the table ``imu`` or ``strapdown``: ``method="ferraris"``. Beside a file, they are set over
+        its keys.
 
     Returns
     -------
@@ -131,8 +128,9 @@ def study(path_or_kind: str | Path, /, **keys: Any) -> Study:
 
 def read_study(kind: str, path: Path, overrides: Iterable[str] = ()) -> Study:
     """Read a study of that kind; ``overrides`` as of ``--set``: ``imu.static_start=50 s``. Raises `StudyError`."""
-    load = getattr(import_module("inercal.studies.load"), _LOAD[kind])
-    return Study(kind, load(path, overrides), path)
+    from inercal.studies.load import load_study
+
+    return Study(kind, load_study(SYSTEMS[kind], path, overrides), path)
 
 
 def study_of(given: Study | str | Path) -> Study:
@@ -145,7 +143,7 @@ def study_of(given: Study | str | Path) -> Study:
 
 
 def kind_of(path: Path) -> str:
-    """The kind of study that a file is, told by ``rig.kind`` or the table ``strapdown``.
+    """The kind of study that a file is, told by ``rig.kind``, or by a table.
 
     Raises `StudyError` where it cannot be read.
     """
@@ -157,21 +155,20 @@ def kind_of(path: Path) -> str:
     rig = data.get("rig")
     kind = rig.get("kind") if isinstance(rig, Mapping) else None
     if rig is None:
-        return "strapdown" if "strapdown" in data else "imu"
-    return {"three_axis_gimbals": "selfcal", "sting": "aoa"}.get(str(kind), "turntable")
+        return next((each.kind for each in SYSTEMS.values() if each.table in data), IMU.kind)
+    return next((each.kind for each in SYSTEMS.values() if kind in each.rigs), TURNTABLE.kind)
 
 
 def _of_keys(kind: str, keys: Mapping[str, Any]) -> Any:
     """The settings of a study by keywords; files that it names lie in the working folder."""
-    made = getattr(import_module(f"inercal.studies.{kind}"), f"{kind}_study")
-    return made(tomllib.loads(_document(keys)), "study")
+    return SYSTEMS[kind].read_study(tomllib.loads(_document(keys)), "study")
 
 
 def _in_tables(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """The keywords with those in their tables that stand alone."""
     tables: dict[str, Any] = {}
     for key, value in keys.items():
-        table = "site" if key in _SITE else kind if kind == "imu" and not isinstance(value, Mapping) else ""
+        table = "site" if key in _SITE else "" if isinstance(value, Mapping) else SYSTEMS[kind].table
         if not table or key == "schema":
             tables[key] = {**tables.get(key, {}), **value} if isinstance(value, Mapping) else value
             continue

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,9 @@ from inercal.estimate.result import Estimate
 from inercal.face.calibrations import estimate_of
 from inercal.face.result import Result
 from inercal.face.study import Study, study, study_of
+from inercal.imu.system import SYSTEM as IMU
 from inercal.records.record import Record
+from inercal.systems.listed import SYSTEMS
 
 
 def calibrate(
@@ -81,15 +81,13 @@ def calibrate(
         )
     else:
         study = study_of(study)
-    system = import_module(f"inercal.face.{study.kind}")
-    if hasattr(system, "prepare"):
+    system = study.system
+    if compare and not system.compares:
+        expected = _kinds_with("compares")
+        raise InputError("compare", f"found with a study of kind {study.kind}, expected one of {expected}")
+    if system.prepare:
         system.prepare(study, compare)
-    elif compare:
-        raise InputError(
-            "compare", f"found with a study of kind {study.kind}, expected one of selfcal or aoa"
-        )
-    result: Result = system.calibrate(runs, study, compare, progress)
-    return result
+    return system.calibrate(runs, study, compare, progress)
 
 
 def runs(
@@ -135,13 +133,16 @@ def runs(
     >>> len(ic.runs(table, FOLDER / "sting.toml").estimate.result["runs"])
     1
     """
-    from inercal.face import aoa as system
     from inercal.face.recordings import read
 
     given = study_of(study)
-    if given.kind != "aoa":
-        raise StudyError(str(given.path or "study"), f"is of kind {given.kind}, expected one of kind aoa")
-    system.prepare(given, compare)
+    system = given.system
+    if system.runs is None:
+        raise StudyError(
+            str(given.path or "study"), f"is of kind {given.kind}, expected one of kind {_kinds_with('runs')}"
+        )
+    if system.prepare:
+        system.prepare(given, compare)
     return system.runs(table, given, lambda path: read(path, map), compare, progress)
 
 
@@ -152,7 +153,7 @@ def _imu_study(record: Record, given: dict[str, str]) -> Study:
             "study",
             'missing, expected one, or of an IMU the site: latitude="48 deg" or gravity="9.81744(2) m/s^2"',
         )
-    return study("imu", **(({"method": "ferraris"} if record.labels else {}) | given))
+    return study(IMU.kind, **(({"method": "ferraris"} if record.labels else {}) | given))
 
 
 def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
@@ -185,8 +186,7 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
     study = study_of(study)
     if not isinstance(rng, np.random.Generator):
         raise InputError("rng", f"found {type(rng).__name__}, expected numpy.random.default_rng(seed)")
-    made: Record = _of_system(study, "simulate", "imu, strapdown, turntable, selfcal or aoa")(study, rng)
-    return made
+    return study.system.simulate(study, rng)
 
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
@@ -220,28 +220,14 @@ def design(study: Study | str | Path, what: str | None = None) -> Result:
     12
     """
     study = study_of(study)
-    kinds = {"positions": "turntable", "tolerances": "turntable", "selfcal": "selfcal", "strapdown": "strapdown",
-             "aoa": "aoa"}  # fmt: skip
-    if what is not None and kinds.get(what) != study.kind:
-        raise InputError(
-            "design", f"found {what!r} of a study of kind {study.kind}, expected {_designs(study.kind)}"
-        )
-    if study.kind not in kinds.values():
-        raise InputError(
-            "design",
-            f"found a study of kind {study.kind}, expected one of turntable, selfcal, strapdown or aoa",
-        )
-    system = import_module(f"inercal.face.{study.kind}")
-    if study.kind != "turntable":
-        system.prepare_design(study)
-    result: Result = system.design_tolerances(study) if what == "tolerances" else system.design(study)
-    return result
-
-
-def _designs(kind: str) -> str:
-    """The designs of a kind, in words."""
-    return {"turntable": "'positions' or 'tolerances'", "selfcal": "'selfcal'", "strapdown": "'strapdown'",
-            "aoa": "'aoa'"}.get(kind, "a study of kind turntable, selfcal, strapdown or aoa")  # fmt: skip
+    designs = study.system.designs
+    name = what or next(iter(designs), "")
+    if name not in designs:
+        names = " or ".join(map(repr, designs)) or f"one of {_kinds_with('designs')}"
+        found = f"found {what!r} of" if what else "found"
+        raise InputError("design", f"{found} a study of kind {study.kind}, expected {names}")
+    designs[name].prepare(study)
+    return designs[name].find(study)
 
 
 def sensitivity(study: Study | str | Path) -> Result:
@@ -266,16 +252,16 @@ def sensitivity(study: Study | str | Path) -> Result:
     ['S', 'ST', 'S', 'ax', 'S', 'ay', 'S', 'az', 'S', 'wx', 'S', 'wy']
     """
     study = study_of(study)
-    result: Result = _of_system(study, "sensitivity", "turntable")(study)
-    return result
+    if (found := study.system.sensitivity) is None:
+        expected = _kinds_with("sensitivity")
+        raise InputError("sensitivity", f"found a study of kind {study.kind}, expected one of {expected}")
+    return found(study)
 
 
-def _of_system(study: Study, verb: str, expected: str) -> Callable[..., Any]:
-    """The function of a verb for the kind of a study; raises `InputError` where there is none."""
-    function: Callable[..., Any] | None = getattr(import_module(f"inercal.face.{study.kind}"), verb, None)
-    if function is None:
-        raise InputError(verb, f"found a study of kind {study.kind}, expected one of {expected}")
-    return function
+def _kinds_with(offer: str) -> str:
+    """The kinds of study whose systems offer this, in words."""
+    *kinds, last = (kind for kind, system in SYSTEMS.items() if getattr(system, offer))
+    return f"{', '.join(kinds)} or {last}" if kinds else last
 
 
 def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 25.0) -> Result:
@@ -306,7 +292,7 @@ def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 2
     >>> ic.temperature(sweep, at="30 degC").status.value
     'ok'
     """
-    from inercal.face.imu import of_temperature
+    from inercal.imu.verbs import of_temperature
     from inercal.units import parse_quantity
 
     about = parse_quantity(at, "temperature", "at").value if isinstance(at, str) else float(at)

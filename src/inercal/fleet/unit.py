@@ -15,7 +15,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -96,9 +95,8 @@ class Batch:
     def prepare(self) -> None:
         """Load what the calibration needs, and compile it where that was never done; raises `InputError`."""
         study = read_study(kind_of(self.study), self.study, self.overrides)
-        system = import_module(f"inercal.face.{study.kind}")
-        if hasattr(system, "prepare"):
-            system.prepare(study)
+        if study.system.prepare:
+            study.system.prepare(study, False)
 
     def _row(self, unit: Unit) -> Row:
         """The row of a unit, by a new calibration where it must be."""

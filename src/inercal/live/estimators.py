@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from inercal._jit import compiling
 from inercal.errors import StudyError
 from inercal.findings import Finding
+from inercal.systems.listed import SYSTEMS
 
 if TYPE_CHECKING:
     from inercal.aoa.settings import AoaSettings
@@ -29,21 +30,14 @@ def of_study(study: Study, interval: float, say: Say, say_finding: SayFinding) -
 
     A study of an IMU asks for its monitor: rest and noise. Raises `StudyError` where none works on a stream.
     """
+    if (prepare := study.system.stream) is None:
+        *kinds, last = (kind for kind, system in SYSTEMS.items() if system.stream)
+        raise StudyError(
+            study.path or "study",
+            f"is of the kind {study.kind}, expected {', '.join(kinds)} or {last} for a stream",
+        )
     with study.at_fault():
-        match study.kind:
-            case "aoa":
-                make = aoa(study.settings, interval, say, say_finding)
-            case "selfcal":
-                make = selfcal(study.settings, interval, say, say_finding)
-            case "strapdown":
-                make = strapdown(study.settings, say, say_finding)
-            case "imu":
-                make = monitor(interval, say)
-            case _:
-                raise StudyError(
-                    study.path or "study",
-                    f"is of the kind {study.kind}, expected aoa, selfcal, strapdown or imu for a stream",
-                )
+        make = prepare(study.settings, interval, say, say_finding)
 
     def of_columns(lines: Lines) -> Recursive[Any]:
         with study.at_fault():

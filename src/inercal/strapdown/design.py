@@ -208,6 +208,11 @@ def stated_turns(plan: Plan) -> list[list[str]]:
     return [[AXES[axis], f"{math.degrees(angle):.10g} deg"] for axis, angle in plan.turns]
 
 
+def nineteen() -> list[list[str]]:
+    """Turns of the path of 19 positions, as a study states them."""
+    return stated_turns(Plan(NINETEEN))
+
+
 def _shortest(settings: StrapdownSettings) -> float:
     """Shortest rest [s] with its margins."""
     return LIMITS.shortest_rest + 2.0 * settings.rests.margin

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from inercal._toml import read_toml
+from inercal.aoa.system import SYSTEM as AOA
 from inercal.errors import StudyError
+from inercal.imu.system import SYSTEM as IMU
+from inercal.selfcal.system import SYSTEM as SELFCAL
+from inercal.strapdown.system import SYSTEM as STRAPDOWN
 from inercal.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
+from inercal.systems.contract import System
+from inercal.systems.listed import SYSTEMS
 from inercal.units import shown
 
 # each kind of study brings models that take a tenth of a second to build: those of the others are not wanted
@@ -21,23 +26,6 @@ if TYPE_CHECKING:
     from inercal.imu.settings import ImuSettings
     from inercal.selfcal.settings import SelfcalSettings
     from inercal.strapdown.settings import StrapdownSettings
-    from inercal.turntable.settings import TurntableSettings
-
-#: rig.kind -> the command whose studies have it; those of a turntable serve several
-_COMMANDS = {
-    "two_axis_turntable": "calibrate turntable",
-    "three_axis_turntable": "calibrate turntable",
-    "three_axis_gimbals": "selfcal",
-    "sting": "aoa",
-}
-
-_EXPECTED = {
-    "calibrate imu": "one for `inercal calibrate imu`",
-    "calibrate strapdown": "one of a strapdown unit",
-    "calibrate turntable": "one of a turntable",
-    "selfcal": "one for `inercal selfcal`",
-    "aoa": "one for `inercal aoa`",
-}
 
 #: tables (a regular expression) that hold one of these keys: setting one takes the place of the others
 _ONE_OF = (
@@ -59,11 +47,9 @@ _FILES = r"estimator\.prior|motion\.file|positions\.file|rig\.errors\.\w+\.table
 _OPEN = {"site.latitude": "48.1 deg"}
 
 
-def reader(kind: str) -> Callable[[Mapping[str, Any], str | Path], Any]:
-    """Readers of a study's parsed TOML: of ``imu``, ``strapdown``, ``turntable``, ``selfcal`` or ``aoa``."""
-    module = importlib.import_module(f"inercal.studies.{kind}")
-    read: Callable[[Mapping[str, Any], str | Path], Any] = getattr(module, f"{kind}_study")
-    return read
+def load_study(system: System, path: str | Path, overrides: Iterable[str] = ()) -> Any:
+    """Settings of the study of a system, a TOML file; parameters and errors as of `load_imu_study`."""
+    return system.read_study(_read(path, overrides, system), path)
 
 
 def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettings:
@@ -76,9 +62,8 @@ def load_imu_study(path: str | Path, overrides: Iterable[str] = ()) -> ImuSettin
 
     Raises `StudyError`: file and key, what was found, what was expected.
     """
-    from inercal.studies.imu import imu_study
-
-    return imu_study(_read(path, overrides, "calibrate imu"), path)
+    settings: ImuSettings = load_study(IMU, path, overrides)
+    return settings
 
 
 def load_strapdown_study(path: str | Path, overrides: Iterable[str] = ()) -> StrapdownSettings:
@@ -86,19 +71,8 @@ def load_strapdown_study(path: str | Path, overrides: Iterable[str] = ()) -> Str
 
     Parameters and errors as of `load_imu_study`.
     """
-    from inercal.studies.strapdown import strapdown_study
-
-    return strapdown_study(_read(path, overrides, "calibrate strapdown"), path)
-
-
-def load_turntable_study(path: str | Path, overrides: Iterable[str] = ()) -> TurntableSettings:
-    """Read the study of a turntable: of its sensitivity analysis, design, simulation and calibration.
-
-    Parameters and errors as of `load_imu_study`.
-    """
-    from inercal.studies.turntable import turntable_study
-
-    return turntable_study(_read(path, overrides, "calibrate turntable"), path)
+    settings: StrapdownSettings = load_study(STRAPDOWN, path, overrides)
+    return settings
 
 
 def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> SelfcalSettings:
@@ -106,9 +80,8 @@ def load_selfcal_study(path: str | Path, overrides: Iterable[str] = ()) -> Selfc
 
     Parameters and errors as of `load_imu_study`.
     """
-    from inercal.studies.selfcal import selfcal_study
-
-    return selfcal_study(_read(path, overrides, "selfcal"), path)
+    settings: SelfcalSettings = load_study(SELFCAL, path, overrides)
+    return settings
 
 
 def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettings:
@@ -116,9 +89,8 @@ def load_aoa_study(path: str | Path, overrides: Iterable[str] = ()) -> AoaSettin
 
     Parameters and errors as of `load_imu_study`.
     """
-    from inercal.studies.aoa import aoa_study
-
-    return aoa_study(_read(path, overrides, "aoa"), path)
+    settings: AoaSettings = load_study(AOA, path, overrides)
+    return settings
 
 
 def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Path, ...]:
@@ -127,13 +99,12 @@ def files_of(path: Path, given: Mapping[str, Any], unread: str = "") -> tuple[Pa
     return (path, *(path.parent / name for key, name in named.items() if key.split(".")[0] != unread))
 
 
-def files_named(kind: str, path: Path, overrides: Iterable[str], unread: str = "") -> tuple[Path, ...]:
+def files_named(system: System, path: Path, overrides: Iterable[str], unread: str = "") -> tuple[Path, ...]:
     """The study, and the files that it names with its overrides, as `files_of`, none of them read.
 
     Raises `StudyError` where the study itself cannot be read.
     """
-    command = kind if kind in ("selfcal", "aoa") else f"calibrate {kind}"
-    return files_of(path, _read(path, overrides, command), unread)
+    return files_of(path, _read(path, overrides, system), unread)
 
 
 def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -147,40 +118,36 @@ def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             yield name, entry
 
 
-def _read(path: str | Path, overrides: Iterable[str], command: str) -> dict[str, Any]:
-    """The file with the overrides put in; refused where it is a study for another command."""
+def _read(path: str | Path, overrides: Iterable[str], system: System) -> dict[str, Any]:
+    """The file with the overrides put in; refused where it is a study of another system."""
     data = read_toml(path, StudyError)
-    if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig", "strapdown"}:
+    if is_map(data):
         raise StudyError(path, "found a column map, which goes behind --map, expected a study")
     rig = data.get("rig")
     kind = rig.get("kind") if isinstance(rig, dict) else None
-    meant_for = _COMMANDS.get(kind, command) if isinstance(kind, str) else command
-    if meant_for != command:
+    other = next((each for each in SYSTEMS.values() if kind in each.rigs), system)
+    expected = f"expected one {system.of}"
+    if other is not system:
+        raise StudyError(path, f"rig.kind: found {kind!r}, a study for `inercal {other.command}`, {expected}")
+    own = [each for each in SYSTEMS.values() if each.table in data]
+    if rig is None and own and system not in own:
         raise StudyError(
             path,
-            f"rig.kind: found {kind!r}, a study for `inercal {meant_for}`, expected {_EXPECTED[command]}",
-        )
-    own = [f"calibrate {table}" for table in ("imu", "strapdown") if table in data]
-    if rig is None and own and command not in own:
-        needed = (
-            "strapdown"
-            if command == "calibrate strapdown"
-            else "imu"
-            if command == "calibrate imu"
-            else "rig"
-        )
-        raise StudyError(
-            path,
-            f"found a study for `inercal {own[0]}`, expected {_EXPECTED[command]}, with a table [{needed}]",
+            f"found a study for `inercal {own[0].command}`, {expected}, with a table [{system.table or 'rig'}]",
         )
     if len(own) > 1:
-        raise StudyError(
-            path, "found the tables [imu] and [strapdown], expected one of them: they tell the kind of study"
-        )
+        names = " and ".join(f"[{each.table}]" for each in own)
+        raise StudyError(path, f"found the tables {names}, expected one of them: they tell the kind of study")
     for override in sorted(overrides, key=lambda each: not each.startswith("motion.kind")):  # it makes room
         put(data, override, Path(path).parent)
     _refuse_unfilled(data, path)
     return data
+
+
+def is_map(data: Mapping[str, Any]) -> bool:
+    """True for a column map in the place of a study."""
+    of_study = {"site", "rig", *(system.table for system in SYSTEMS.values())}
+    return bool(data.keys() & {"columns", "file"}) and not data.keys() & of_study
 
 
 def _refuse_unfilled(data: Mapping[str, Any], path: str | Path) -> None:

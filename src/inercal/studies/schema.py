@@ -9,21 +9,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 from pydantic_core import core_schema
 
-from inercal._toml import Strict
-from inercal.studies.aoa import AoaStudyFile
-from inercal.studies.imu import ImuStudyFile
-from inercal.studies.selfcal import SelfcalStudyFile
-from inercal.studies.strapdown import StrapdownStudyFile
-from inercal.studies.turntable import TurntableStudyFile
-
-#: a study is one of these
-STUDY_FILES: tuple[type[Strict], ...] = (
-    ImuStudyFile,
-    StrapdownStudyFile,
-    TurntableStudyFile,
-    SelfcalStudyFile,
-    AoaStudyFile,
-)
+from inercal.systems.listed import SYSTEMS
 
 
 class TomlSchema(GenerateJsonSchema):
@@ -51,7 +37,7 @@ def json_schema() -> Mapping[str, Any]:
         Unknown keys are rejected. Whether a unit exists and a value makes sense is checked on reading.
     """
     references, definitions = models_json_schema(
-        [(file, "validation") for file in STUDY_FILES], schema_generator=TomlSchema
+        [(system.study_file(), "validation") for system in SYSTEMS.values()], schema_generator=TomlSchema
     )
     return {
         "$schema": GenerateJsonSchema.schema_dialect,

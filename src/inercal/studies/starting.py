@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
+import tomllib
+from collections.abc import Collection
+from typing import Any, Final
 
 #: keys of which a table of a study holds one: ways to state positions, a path, a distribution
 POSITIONS: Final = ("grid", "plan", "list", "file")
@@ -139,11 +141,33 @@ first_dwell = "60 s"
 """
 )
 
-STARTING: Final = {
-    "imu": _COMMON + '[imu]\nmethod = "multiposition"\n',
-    "strapdown": _STRAPDOWN,
-    "turntable": _TURNTABLE,
-    "selfcal": _SELFCAL,
-    "aoa": _AOA,
-}
-"""A study of each kind as TOML: it loads as it is, but for the keys that must be filled in."""
+
+def imu_study(channels: Collection[str]) -> dict[str, Any]:
+    """Keys of a new study of an IMU, whose method follows from the channels of the recording."""
+    method = "aided" if "phi1" in channels else "ferraris" if "label" in channels else "multiposition"
+    return _keys(f'{_COMMON}[imu]\nmethod = "{method}"\n')
+
+
+def strapdown_study() -> dict[str, Any]:
+    """Keys of a new study of a strapdown unit."""
+    return _keys(_STRAPDOWN)
+
+
+def turntable_study(channels: Collection[str]) -> dict[str, Any]:
+    """Keys of a new study of a turntable: of a rate test where the channels of the recording have a rate."""
+    return _keys(_TURNTABLE) | ({"rate_test": {}} if "rate" in channels else {})
+
+
+def selfcal_study() -> dict[str, Any]:
+    """Keys of a new study of a self-calibration."""
+    return _keys(_SELFCAL)
+
+
+def aoa_study() -> dict[str, Any]:
+    """Keys of a new study of an angle of attack."""
+    return _keys(_AOA)
+
+
+def _keys(text: str) -> dict[str, Any]:
+    """Keys of a study: it loads as it is, but for those that must be filled in."""
+    return {"schema": 1, **tomllib.loads(text)}

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import re
 import shlex
-import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from inercal.instruments.by_angle import CHANNELS
 from inercal.rigs.tables import slots
 from inercal.studies.commented import commented
-from inercal.studies.load import put, reader, unfilled
+from inercal.studies.load import put, unfilled
 from inercal.studies.schema import json_schema
-from inercal.studies.starting import STARTING
 from inercal.studies.text import toml, with_keys
 from inercal.studies.tolerances import SYMBOLS
+from inercal.systems.listed import SYSTEMS
 from inercal.units import Unit
 
 #: kind -> key, value for outputs of rate or acceleration, value for others (``{u}``), comment; of the channel on
@@ -127,8 +126,6 @@ def _example(key: str, value: str, comment: str) -> str:
     return _line(f"# {key}", value, comment)
 
 
-Kind = Literal["imu", "strapdown", "turntable", "selfcal", "aoa"]
-
 _HEAD = """\
 # Study {what}. Fill in each "?", replace what is not so; take the "# " from keys that you know.
 # Quantities are texts with a unit; "9.81744(2) m/s^2" is 9.81744 with a standard uncertainty of 0.00002.
@@ -137,25 +134,12 @@ _HEAD = """\
 
 """
 
-#: kind -> what it is of; the next command where there is no recording, where there is one
-_NEXT = {
-    "imu": ("for `inercal calibrate imu`", "calibrate imu {files}", "calibrate imu {files}"),
-    "strapdown": (
-        "of a strapdown unit",
-        "simulate strapdown {study} --out simulated.csv",
-        "calibrate strapdown {files}",
-    ),
-    "turntable": ("of a turntable", "sensitivity {study}", "calibrate turntable {files}"),
-    "selfcal": ("of a self-calibration", "simulate selfcal {study} --out simulated.csv", "selfcal {files}"),
-    "aoa": ("of an angle of attack", "simulate aoa {study} --out simulated.csv", "aoa {files}"),
-}
-
 _HIDDEN = r"sensors\.(a\d+|gyro_\w+)"
 """Sensors beyond those of a new study: their keys are those of the others."""
 
 
 def template(
-    kind: Kind,
+    kind: str,
     record_paths: Sequence[str | Path] = (),
     study_path: str | Path = "STUDY.toml",
     map_path: str | Path | None = None,
@@ -174,32 +158,20 @@ def template(
         Keys to state, as in `inercal.studies.load.load_imu_study`; raises `StudyError` for one that the study cannot
         have.
     """
-    given = channels or {}
-    study = _starting(kind, given)
+    system, given = SYSTEMS[kind], channels or {}
+    study = system.new_study(given)
     for override in overrides:
         put(study, override, Path(study_path).parent)
-    reader(kind)(unfilled(study, "45 deg"), study_path)
+    system.read_study(unfilled(study, "45 deg"), study_path)
     schema = json_schema()
     definitions = schema["$defs"]
-    body = commented(definitions[f"{kind.capitalize()}StudyFile"], definitions, study, _hidden())
-    if kind == "turntable":
+    body = commented(definitions[system.study_file().__name__], definitions, study, _hidden())
+    if "[instrument]" in body:
         body = _with_instrument(body, instrument_lines(given), study.get("instrument", {}))
-    what, alone, recorded = _NEXT[kind]
     files = _files(record_paths or ["RECORD.csv"], study_path, map_path)
-    following = (recorded if record_paths else alone).format(files=files, study=_words([study_path]))
-    return _HEAD.format(what=what, next=following) + body
-
-
-def _starting(kind: Kind, channels: Mapping[str, Unit | None]) -> dict[str, Any]:
-    """The keys in force."""
-    study = {"schema": 1, **tomllib.loads(STARTING[kind])}
-    if kind == "imu":
-        study["imu"]["method"] = (
-            "aided" if "phi1" in channels else "ferraris" if "label" in channels else "multiposition"
-        )
-    if kind == "turntable" and "rate" in channels:
-        study["rate_test"] = {}
-    return study
+    first = f"{system.command} {{files}}" if record_paths else system.first
+    following = first.format(files=files, study=_words([study_path]))
+    return _HEAD.format(what=system.of, next=following) + body
 
 
 def _hidden() -> str:

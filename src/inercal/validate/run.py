@@ -9,9 +9,8 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import import_module
 from importlib.metadata import version
 from typing import Any, cast
 
@@ -22,26 +21,24 @@ from inercal.estimate.executors import Executor, Processes, Serial
 from inercal.estimate.result import Estimate, timed
 from inercal.examples import EXAMPLES, shipped
 from inercal.findings import Finding, Status
+from inercal.systems import listed
+from inercal.validate import foundation, noise
 from inercal.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
 
 SYSTEMS: Mapping[str, str] = {
     "foundation": "units, rotations, gravity, least squares",
     "noise": "Allan deviation and coefficients of noise",
-    "imu": "calibration of IMUs, and conversion to other tools",
-    "strapdown": "calibration of strapdown units",
-    "turntable": "sensitivity, design and calibration on a turntable",
-    "selfcal": "self-calibration of a platform",
-    "aoa": "angle of attack",
+    **{kind: system.shows for kind, system in listed.SYSTEMS.items()},
 }
-"""Modules of cases, in the order of the floors, and what they are about."""
+"""Groups of cases, in the order of the floors, and what they are about."""
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 
 
-def cases_of(system: str) -> tuple[Case, ...]:
-    """The cases of a system."""
-    cases: tuple[Case, ...] = import_module(f"inercal.validate.{system}").CASES
-    return cases
+def cases_of(system: str) -> Sequence[Case]:
+    """The cases of a system, or of the floors below the systems."""
+    below = {"foundation": foundation.CASES, "noise": noise.CASES}
+    return below[system] if system in below else listed.SYSTEMS[system].cases()
 
 
 def executor() -> Executor:

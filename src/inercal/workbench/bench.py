@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,10 +17,12 @@ import numpy as np
 from inercal._files import read_bytes, write_text
 from inercal.addresses import without_secrets
 from inercal.errors import InercalError, InputError, plain, spelt
+from inercal.face.foresight import PLANNED
 from inercal.laboratory.place import VARIABLE
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.jobs import Job, Queue
 from inercal.workbench.measurements import MEASURED, Measurements
-from inercal.workbench.sessions import COMMANDS, MAP, PART, STUDY, Session, Sessions, put
+from inercal.workbench.sessions import MAP, PART, STUDY, Session, Sessions, put
 
 if TYPE_CHECKING:
     from inercal.arrays import Array
@@ -104,7 +106,7 @@ class Bench:
         known = kind_of_record(names) if kind is None else kind
         stays = session.map is not None and session.study is None
         session = self.sessions.of_kind(session, known)
-        study, column_map = begun(known, names, Path(STUDY), Path(MAP), rate)  # type: ignore[arg-type]
+        study, column_map = begun(known, names, Path(STUDY), Path(MAP), rate)
         write_text(session.folder / STUDY, study)
         if column_map is not None and not stays:
             write_text(session.folder / MAP, column_map)
@@ -116,8 +118,7 @@ class Bench:
         """Write a guessed map for the recordings of a session; raises `InputError` where they cannot be read."""
         from inercal.records.guess import guess_map
 
-        table, model = session.kind == "turntable", session.kind == "aoa"
-        put(session, MAP, guess_map(session.recordings, on_table=table, of_model=model))
+        put(session, MAP, guess_map(session.recordings, **SYSTEMS[session.kind].guess))
 
     def run(self, session: Session) -> Job:
         """Put the calibration of a session into the queue; raises `InputError` where a part is missing."""
@@ -126,16 +127,14 @@ class Bench:
 
     def plan(self, kind: str) -> Session:
         """A new session with a study of that kind to plan a test with, without a recording; raises `InputError`."""
-        from inercal.face.foresight import PLANNED
-
         if kind not in PLANNED:
             raise InputError("kind", f"found {kind!r}, expected one of {', '.join(PLANNED)}")
-        session = self.sessions.begin(f"plan of a test: {KINDS[kind]}")
+        session = self.sessions.begin(f"plan of a test: {SYSTEMS[kind].title}")
         return self.begin_study(session, kind)
 
     def again_as(self, session: Session, kind: str) -> Session:
         """A new session with recordings and map of another, and a study of that kind; raises `InputError`."""
-        made = self.sessions.begin(f"{session.title}, as {KINDS[kind]}")
+        made = self.sessions.begin(f"{session.title}, as {SYSTEMS[kind].title}")
         for path in (*session.recordings, *filter(None, [session.map])):
             try:
                 os.link(
@@ -162,15 +161,12 @@ class Bench:
 
     def design(self, session: Session, settings: Sequence[str] = ()) -> Job:
         """Put the search for a better plan into the queue, with ``settings`` as of ``--set``; raises `InputError`."""
-        from inercal.workbench.plans import KINDS as PLANNED
-
-        if session.kind not in PLANNED or session.study is None:
+        if (plan := SYSTEMS[session.kind].plan) is None or session.study is None:
             raise InputError(
                 session.title, f"found no study that plans a test, expected one of {', '.join(PLANNED)}"
             )
-        kind = PLANNED[session.kind]
-        words = [*kind.command, STUDY, *(f"--set={setting}" for setting in settings)]
-        out = ["--out", f"{{out}}/plan{kind.ending}"] if kind.ending else []
+        words = ["design", plan.design, STUDY, *(f"--set={setting}" for setting in settings)]
+        out = ["--out", f"{{out}}/plan{plan.ending}"] if plan.ending else []
         return self.queue.add(session.id, session.folder, [*words, *out, "--report", "{out}/report.html"])
 
     def result(self, job: Job) -> Result:
@@ -306,7 +302,7 @@ class Bench:
         """A new session with a study of that kind to measure by wire, without a recording; raises `InputError`."""
         if kind not in MEASURED:
             raise InputError("kind", f"found {kind!r}, expected one of {', '.join(MEASURED)}")
-        return self.begin_study(self.sessions.begin(f"by wire: {KINDS[kind]}"), kind)
+        return self.begin_study(self.sessions.begin(f"by wire: {SYSTEMS[kind].title}"), kind)
 
     def close(self) -> None:
         """End the running job, and all measurements."""
@@ -341,14 +337,3 @@ def said_of(error: BaseException) -> str:
     if isinstance(error, InercalError):
         return words
     return f"unexpected {type(error).__name__} ({words}), a fault of inercal's own: please report it"
-
-
-KINDS: Mapping[str, str] = {
-    "imu": "IMU by hand, on its sides, or on a table",
-    "strapdown": "strapdown unit in rests and turns",
-    "turntable": "instrument on a turntable",
-    "selfcal": "platform in gimbals",
-    "aoa": "wind-tunnel model on a sting",
-}
-"""Kinds of study in words, in the order of the commands."""
-assert KINDS.keys() == COMMANDS.keys()

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from inercal.errors import InercalError
 from inercal.studies.text import parsed, toml
+from inercal.systems.listed import SYSTEMS
 
 Widget = Literal["choice", "switch", "text", "value"]
 """Kinds of typing a key: chosen, switched, a text, or any value of TOML."""
@@ -64,10 +65,8 @@ def tables(kind: str, text: str) -> tuple[Table, ...]:
 
 def problem(kind: str, text: str) -> str:
     """The fault of a study in one sentence; empty without one."""
-    from inercal.studies.load import reader
-
     try:
-        reader(kind)(parsed(text), "study")
+        SYSTEMS[kind].read_study(parsed(text), "study")
     except InercalError as error:
         return str(error)
     return ""

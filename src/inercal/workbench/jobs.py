@@ -24,6 +24,7 @@ from typing import Any
 from inercal._files import is_pipe, read_bytes, write_text
 from inercal.addresses import shown_address
 from inercal.errors import InercalError, InputError, plain, spelt
+from inercal.systems.listed import SYSTEMS
 
 _ABOUT, _LAST = "job.json", 20_000
 _PATIENCE = 5.0
@@ -68,7 +69,8 @@ class Job:
     @property
     def calibrates(self) -> bool:
         """True for a calibration, as against what is done with its result."""
-        return self.arguments[0] in ("calibrate", "selfcal", "aoa")
+        words = " ".join(self.arguments[:2]) if self.arguments[0] == "calibrate" else self.arguments[0]
+        return words in {system.command for system in SYSTEMS.values()}
 
     @property
     def designs(self) -> bool:

@@ -21,6 +21,7 @@ from inercal.live.address import Mqtt, Pieces, Replay, Sink, Source, Text, sink_
 from inercal.live.feed import frame_of
 from inercal.live.measurement import Measurement, Plan
 from inercal.records.maps import read_map
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.rest_detector import Rest
 from inercal.workbench.sessions import MAP, STUDY, Session, Sessions, safe_name
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 FOLDER = "live"
 """Folder of recordings and sinks in that of a session."""
 
-MEASURED = {"aoa": "angle", "selfcal": "coefficients", "strapdown": "coefficients", "imu": "rest and noise"}
+MEASURED = {kind: system.streams for kind, system in SYSTEMS.items() if system.stream}
 """Quantities that a study of each kind measures."""
 
 MOST = 4

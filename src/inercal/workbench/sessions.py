@@ -19,6 +19,9 @@ from typing import Any
 from inercal._files import read_bytes, write_bytes, write_text
 from inercal.errors import InputError, plain, spelt
 from inercal.examples import EXAMPLES, FOLDER
+from inercal.imu.system import SYSTEM as IMU
+from inercal.studies.load import is_map
+from inercal.systems.listed import SYSTEMS
 
 MAP, STUDY = "study-map.toml", "study.toml"
 """Names of the map and of the study in the folder of a session."""
@@ -36,15 +39,6 @@ _ABOUT = "session.json"
 _LONGEST = 120
 _LONGEST_TITLE = 200
 _LARGEST_TOML = 1024**2
-
-COMMANDS = {
-    "imu": ("calibrate", "imu"),
-    "strapdown": ("calibrate", "strapdown"),
-    "turntable": ("calibrate", "turntable"),
-    "selfcal": ("selfcal",),
-    "aoa": ("aoa",),
-}
-"""Words of the command of each kind of study."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +77,7 @@ class Session:
             raise InputError(self.title, "found no recording, expected one")
         if self.study is None:
             raise InputError(self.title, "found no study, expected one")
-        words = [*COMMANDS[self.kind], *(path.name for path in self.recordings)]
+        words = [*SYSTEMS[self.kind].command.split(), *(path.name for path in self.recordings)]
         if self.map is not None:
             words += ["--map", MAP]
         words += ["--study", STUDY]
@@ -113,12 +107,12 @@ class Sessions:
         try:
             about: dict[str, Any] = json.loads(read_bytes(folder / _ABOUT))
             title, kind, made = (spelt(str(about[key])) for key in ("title", "kind", "made"))
-            COMMANDS[kind]
+            SYSTEMS[kind]
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"session {number}", "found none, expected one that was begun") from error
         return Session(number, folder, title, kind, made)
 
-    def begin(self, title: str, kind: str = "imu") -> Session:
+    def begin(self, title: str, kind: str = IMU.kind) -> Session:
         """A new session without files; raises `InputError` for a title that is no plain text."""
         if len(plain("title", title)) > _LONGEST_TITLE:
             raise InputError("title", f"found {len(title)} characters, expected {_LONGEST_TITLE} at most")
@@ -140,8 +134,8 @@ class Sessions:
         if name not in EXAMPLES:
             raise InputError(name, f"no such example, expected one of {', '.join(EXAMPLES)}")
         example = EXAMPLES[name]
-        words = tuple(example.verb.split())
-        kind = next((kind for kind, command in COMMANDS.items() if command == words), "imu")
+        kinds = (kind for kind, system in SYSTEMS.items() if system.command == example.verb)
+        kind = next(kinds, IMU.kind)
         session = self.begin(f"example {name}", kind)
         for file in (*example.records, *filter(None, [example.licence])):
             shutil.copyfile(FOLDER / file, session.folder / Path(file).name)
@@ -152,8 +146,8 @@ class Sessions:
 
     def of_kind(self, session: Session, kind: str) -> Session:
         """The session with another kind of study; raises `InputError` for a kind that is none."""
-        if kind not in COMMANDS:
-            raise InputError("kind", f"found {kind!r}, expected one of {', '.join(COMMANDS)}")
+        if kind not in SYSTEMS:
+            raise InputError("kind", f"found {kind!r}, expected one of {', '.join(SYSTEMS)}")
         changed = Session(session.id, session.folder, session.title, kind, session.made)
         self._tell(changed)
         return changed
@@ -232,7 +226,7 @@ def _place(part: Path, name: str) -> str:
         data = read_toml(part, InputError)
     except InputError as error:  # by the name that it was sent under
         raise InputError(name, error.message) from error
-    return MAP if data.keys() & {"columns", "file"} and not data.keys() & {"site", "rig", "imu"} else STUDY
+    return MAP if is_map(data) else STUDY
 
 
 def _hidden(name: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,11 @@ def verticals(settings: TurntableSettings) -> Array:
     """Directions (r, 3) of the vertical on the instrument in each position. Raises `StudyError` for a grid to be
     analysed."""
     return settings.chain.attitude(_angles(settings))[:, 2]
+
+
+def stated_positions(settings: TurntableSettings) -> list[list[str]]:
+    """Angles of the positions of a study [deg], as it states them."""
+    return [[f"{math.degrees(angle):.10g}" for angle in row] for row in settings.plan.angles.tolist()]
 
 
 def _angles(settings: TurntableSettings) -> Array:

@@ -18,6 +18,8 @@ from inercal.estimate.rounding import short
 from inercal.report.panels import draw
 from inercal.report.sphere import hemispheres
 from inercal.studies.text import with_keys
+from inercal.systems.contract import Plan
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import (
@@ -32,7 +34,7 @@ from inercal.workbench.pages.frame import (
     told,
 )
 from inercal.workbench.pages.run import WORDS
-from inercal.workbench.plans import KINDS, lines_of, with_found, with_lines
+from inercal.workbench.plans import lines_of, named, with_found, with_lines
 from inercal.workbench.sessions import STUDY, Session, put
 
 _MIDDLE, _END = 50, 100
@@ -49,14 +51,14 @@ def add(bench: Bench) -> None:
     async def design(number: str) -> None:
         session = bench.sessions.get(number)
         with framed("Design", session, "design"):
-            if session.kind not in KINDS:
+            if (plan := SYSTEMS[session.kind].plan) is None:
                 ui.label("An IMU that is moved by hand has no plan: its poses are found from the recording.")
                 return
             if session.study is None:
                 ui.label("There is no study yet, which would say what is planned.")
                 ui.link("Begin one", f"/sessions/{session.id}/study")
                 return
-            desk = Desk(bench, session)
+            desk = Desk(bench, session, plan)
             await ui.context.client.connected()
             await desk.judge()
 
@@ -64,8 +66,8 @@ def add(bench: Bench) -> None:
 class Desk:
     """The plan of a study, edited as lines; what is shown follows."""
 
-    def __init__(self, bench: Bench, session: Session) -> None:
-        self.bench, self.session, self.kind = bench, session, KINDS[session.kind]
+    def __init__(self, bench: Bench, session: Session, plan: Plan) -> None:
+        self.bench, self.session, self.plan, self.plans = bench, session, plan, named(plan)
         self.foresight: Foresight | None = None
         self.factors: Array = np.ones(0)
         self.text = read_bytes(session.folder / STUDY).decode(errors="replace")
@@ -81,8 +83,8 @@ class Desk:
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
             self.levers = ui.element("div").classes("w-full")
             self.numbers = ui.element("div").classes("w-full md:sticky md:top-2 self-start")
-        heading("A better plan" if self.kind.ending else "Layouts side by side")
-        button("Search" if self.kind.ending else "Compare", self.search)
+        heading("A better plan" if self.plan.ending else "Layouts side by side")
+        button("Search" if self.plan.ending else "Compare", self.search)
         self.same = ui.element("div").classes("w-full")
         self.found = ui.element("div").classes("w-full")
         job = bench.last_design(session)
@@ -92,29 +94,29 @@ class Desk:
     def _plan(self) -> None:
         """The plan as lines, and plans by their name."""
         heading("The plan")
-        if self.kind.named:
-            names = list(self.kind.named)
+        if self.plans:
+            names = list(self.plans)
             ui.select(names, label="Begin with", on_change=lambda event: self.named(event.value)).classes(
                 "w-full"
             )
         self.lines = ui.textarea(on_change=lambda event: self.typed(event.value))
         self.lines.props('outlined debounce=300 aria-label="plan, a line each" input-style="height: 19rem"')
         self.lines.classes("w-full command")
-        ui.label(f"A line each: {self.kind.says}. What is typed is written into the study.").classes(
+        ui.label(f"A line each: {self.plan.says}. What is typed is written into the study.").classes(
             "quiet text-sm"
         )
 
     async def named(self, name: str) -> None:
         """Take a plan by its name."""
         with told():
-            await self.write(with_keys(self.text, self.kind.named[name]))
+            await self.write(with_keys(self.text, self.plans[name]))
 
     async def typed(self, lines: str) -> None:
         """The lines were changed: so is the study."""
         if lines == self.shown:
             return
         try:
-            await self.write(with_lines(self.session.kind, self.text, lines), lines)
+            await self.write(with_lines(self.plan, self.text, lines), lines)
         except InercalError as error:
             self.say(str(error), False)
 
@@ -249,9 +251,9 @@ class Desk:
         """The command that judges and searches with the same sizes."""
         self.same.clear()
         sets = [word for each in self.settings() for word in ("--set", each)]
-        out = ["--out", f"plan{self.kind.ending}"] if self.kind.ending else []
+        out = ["--out", f"plan{self.plan.ending}"] if self.plan.ending else []
         with self.same:
-            words = ["inercal", *self.kind.command, STUDY, *sets, *out, "--report", "design.html"]
+            words = ["inercal", "design", self.plan.design, STUDY, *sets, *out, "--report", "design.html"]
             command(shlex.join(words))
 
     def search(self) -> None:
@@ -266,12 +268,12 @@ class Desk:
         with self.found:
             state = ui.label().props('role="status" data-search="1"')
             place = ui.element("div").classes("w-full")
-        plan = job.folder / f"plan{self.kind.ending}"
+        plan = job.folder / f"plan{self.plan.ending}"
 
         def look() -> None:
             now = self.bench.queue.get(job.id)
             of = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
-            what = "search" if self.kind.ending else "comparison"
+            what = "search" if self.plan.ending else "comparison"
             state.set_text(f"The {what} (job {now.id}) {WORDS[now.state]}{of}")
             if now.state not in ENDED:
                 return
@@ -279,7 +281,7 @@ class Desk:
             with place:
                 if now.said.strip() and now.state is not State.DONE:
                     refused(InercalError(now.said.strip()))
-                if self.kind.ending and plan.is_file():
+                if self.plan.ending and plan.is_file():
                     button("Take the plan found", lambda: self.take(plan.read_text()), main=True)
                 if now.report is not None:
                     report(now, "search for a plan")
@@ -290,7 +292,7 @@ class Desk:
     async def take(self, found: str) -> None:
         """Write the plan found into the study."""
         with told():
-            await self.write(with_found(self.session.kind, self.text, found))
+            await self.write(with_found(self.plan, self.text, found))
             ui.notify("The plan found is in the study.", type="positive")
 
 

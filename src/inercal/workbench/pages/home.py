@@ -9,10 +9,11 @@ from nicegui import ui
 
 from inercal.examples import EXAMPLES, Example
 from inercal.face.foresight import PLANNED
-from inercal.workbench.bench import KINDS, Bench
+from inercal.systems.listed import SYSTEMS
+from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import ENDED, Job, State
 from inercal.workbench.pages.frame import button, framed, heading, table, told
-from inercal.workbench.sessions import COMMANDS, Session
+from inercal.workbench.sessions import Session
 
 _SHOWN = 20
 _EVERY = 1.0
@@ -46,12 +47,12 @@ def add(bench: Bench) -> None:
             heading("Plan a test")
             with ui.row():
                 for kind in PLANNED:
-                    button(KINDS[kind], partial(plan, kind), label=f"plan: {KINDS[kind]}")
+                    button(SYSTEMS[kind].title, partial(plan, kind), label=f"plan: {SYSTEMS[kind].title}")
 
 
 def _title(example: Example) -> str:
     """The title of an example; with its command, where that has no page here."""
-    has_page = tuple(example.verb.split()) in COMMANDS.values()
+    has_page = example.verb in {system.command for system in SYSTEMS.values()}
     return (
         example.title if has_page else f"{example.title}; to look at, its command is inercal {example.verb}"
     )
@@ -137,7 +138,7 @@ def sessions(bench: Bench, every: bool) -> None:
                     f"{session.id} {session.title}",
                     f"/sessions/{session.id}/{_step(bench, session)}",
                 ),
-                KINDS[session.kind],
+                SYSTEMS[session.kind].title,
                 "" if job is None else job.state.value,
                 session.made[:16].replace("T", " "),
             ]

@@ -13,8 +13,9 @@ from typing import Any
 from nicegui import ui
 
 from inercal.live.address import SINKS, SOURCES
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench import live_pictures
-from inercal.workbench.bench import KINDS, Bench
+from inercal.workbench.bench import Bench
 from inercal.workbench.live_status import rows, status
 from inercal.workbench.measurements import (
     MEASURED,
@@ -69,7 +70,8 @@ def add(bench: Bench) -> None:
             ).classes("quiet")
             with ui.row():
                 for kind, what in MEASURED.items():
-                    button(f"{KINDS[kind]}: {what}", partial(begin, kind), label=f"measure: {KINDS[kind]}")
+                    title = SYSTEMS[kind].title
+                    button(f"{title}: {what}", partial(begin, kind), label=f"measure: {title}")
 
 
 class _Desk:

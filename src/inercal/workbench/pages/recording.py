@@ -13,7 +13,8 @@ from nicegui import events, ui
 
 from inercal.errors import InercalError
 from inercal.records.places import counted
-from inercal.workbench.bench import KINDS, Bench, Looked
+from inercal.systems.listed import SYSTEMS
+from inercal.workbench.bench import Bench, Looked
 from inercal.workbench.charts import Notes, figure
 from inercal.workbench.pages.columns import Columns, columns_there
 from inercal.workbench.pages.frame import (
@@ -97,9 +98,12 @@ def _kind(bench: Bench, session: Session) -> None:
                 button("Leave them", ui.navigate.reload)
         dialog.open()
 
-    ui.select(dict(KINDS), value=session.kind, label="The recording is of", on_change=choose).classes(
-        "w-96 max-w-full"
-    )
+    ui.select(
+        {kind: system.title for kind, system in SYSTEMS.items()},
+        value=session.kind,
+        label="The recording is of",
+        on_change=choose,
+    ).classes("w-96 max-w-full")
 
 
 async def _look(bench: Bench, session: Session, place: ui.element, span: tuple[float, float] | None) -> None:

@@ -14,6 +14,8 @@ from inercal.estimate.rounding import rounded
 from inercal.face.result import Result
 from inercal.findings import Status
 from inercal.records.places import counted
+from inercal.strapdown.system import SYSTEM as STRAPDOWN
+from inercal.systems.listed import SYSTEMS
 from inercal.workbench.advice import Advice, advice_of
 from inercal.workbench.bench import Bench
 from inercal.workbench.jobs import Job, State
@@ -59,7 +61,7 @@ def add(bench: Bench) -> None:
                 for name, words in (("result.json", "Result (JSON)"), ("report.html", "Report (HTML)")):
                     if (job.folder / name).is_file():
                         ui.link(words, f"/api/v1/jobs/{job.id}/files/{name}", new_tab=True)
-            if session.kind in ("imu", "strapdown"):
+            if SYSTEMS[session.kind].converts:
                 _converted(bench, job)
             _compared(bench, job)
             _kept(bench, job)
@@ -72,7 +74,7 @@ def add(bench: Bench) -> None:
                 report(job, "report")
 
 
-_BY_TURNS = "inercal calibrate strapdown"
+_BY_TURNS = f"inercal {STRAPDOWN.command}"
 """The other method, which a verdict may advise."""
 
 _COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
@@ -83,7 +85,7 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
     ui.label(f"{result.status.value}: {result.message}").classes(
         "verdict " + _COLOURS.get(result.status, "bad")
     ).props('data-verdict="1"')
-    if session.kind == "imu" and _BY_TURNS in result.message:
+    if session.kind != STRAPDOWN.kind and _BY_TURNS in result.message:
         button(f"Begin again with {_BY_TURNS}", partial(_begin_again, bench, session))
     if not result.findings:
         return
@@ -101,7 +103,7 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
 def _begin_again(bench: Bench, session: Session) -> None:
     """Begin a session by the other method, and open its study."""
     with told():
-        made = bench.again_as(session, "strapdown")
+        made = bench.again_as(session, STRAPDOWN.kind)
         ui.navigate.to(f"/sessions/{made.id}/study")
 
 

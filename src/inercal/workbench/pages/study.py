@@ -11,7 +11,8 @@ from nicegui import events, ui
 from inercal._files import read_bytes
 from inercal.errors import InercalError
 from inercal.studies.text import changed, parsed
-from inercal.workbench.bench import KINDS, Bench
+from inercal.systems.listed import SYSTEMS
+from inercal.workbench.bench import Bench
 from inercal.workbench.form import Key, Table, as_toml, problem, tables
 from inercal.workbench.pages.frame import button, command, copy, framed, heading, refused, saved, told
 from inercal.workbench.sessions import STUDY, Session, put
@@ -33,7 +34,7 @@ def add(bench: Bench) -> None:
             if session.study is None:
                 _without(bench, session)
                 return
-            ui.label(f"Session {session.id}: {KINDS[session.kind]}").classes("quiet")
+            ui.label(f"Session {session.id}: {SYSTEMS[session.kind].title}").classes("quiet")
             Editor(bench, session)
 
 

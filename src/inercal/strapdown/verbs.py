@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.errors import InputError
 from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by, with_span
 from inercal.records.record import Record
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 def prepare(study: Study, compare: bool = False) -> None:
     """Load, or compile, the kernels of `calibrate`, so that they do not count in its time; there is nothing to
     ``compare``."""
-    if compare:
-        raise InputError("compare", "found with a study of kind strapdown, expected one of selfcal or aoa")
     with study.at_fault():
         task.load_kernels(study.settings)
 

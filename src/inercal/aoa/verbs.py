@@ -197,7 +197,7 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 def loaded(estimate: Estimate) -> Result:
     """A result that was saved, in the units of the command line; its angles are in files of their own."""
     from inercal.aoa.result.tables import displayed
-    from inercal.face.imu import loaded as plain
+    from inercal.face.result import loaded as plain
 
     whole, shown = plain(estimate), displayed(estimate)
     return replace(whole, view=replace(plain(shown).view, answer=_answer(estimate.result)))

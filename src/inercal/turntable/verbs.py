@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.estimate.executors import Executor
-from inercal.estimate.result import without_coefficients
+from inercal.estimate.result import Estimate, without_coefficients
 from inercal.face.result import Result, View, of_coefficients
 from inercal.face.study import Progress, Study, calibrations, designed_by
 from inercal.records.record import Record
@@ -178,3 +178,14 @@ def sensitivity(
     words = f"largest: {analysed.indices.factors[largest]}, {analysed.what[largest]}"
     view = View(estimate, words, lambda: [table(analysed)], page, picture)
     return Result(estimate, view, analysed)
+
+
+def loaded(estimate: Estimate) -> Result:
+    """A result that was saved, in the unit of the outputs."""
+    from inercal.face.result import loaded as plain
+    from inercal.turntable.display import displayed
+    from inercal.units import parse_unit
+
+    if "output_unit" not in estimate.conditions:
+        return plain(estimate)
+    return plain(estimate, displayed(estimate, parse_unit(estimate.conditions["output_unit"])))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.estimate.result import Estimate
 from inercal.face.result import Result, of_coefficients
 from inercal.face.study import Study
 from inercal.imu.task import calibrate as calibrate_run
@@ -72,23 +71,3 @@ def of_temperature(model: TemperatureModel) -> Result:
 
     shown = model.estimate.shown()
     return Result(model.estimate, of_coefficients(shown, page), model)
-
-
-def loaded(estimate: Estimate) -> Result:
-    """A result that was saved, in the units of the command line."""
-    from inercal.report.coefficients import budget, correlation
-    from inercal.report.html import render
-
-    def page() -> str:
-        pictures = [correlation(shown)] if len(estimate.names) > 1 else []
-        pictures += [budget(shown)] if estimate.names and estimate.budget else []
-        return render(shown, pictures, f"inercal {estimate.command}")
-
-    if "output_unit" in estimate.conditions:  # of a turntable
-        from inercal.turntable.display import displayed
-        from inercal.units import parse_unit
-
-        shown = displayed(estimate, parse_unit(estimate.conditions["output_unit"]))
-    else:
-        shown = estimate.shown()
-    return Result(estimate, of_coefficients(shown, page))

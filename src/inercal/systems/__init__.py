@@ -1,0 +1,1 @@
+"""The systems: what each of them offers, and the list of them."""
