@@ -59,8 +59,9 @@ def test_the_message_of_an_old_result_is_its_headline():
 def test_what_harms_most_comes_first():
     none, one = Finding("gap", "none"), Finding("outlier", "one", harm=("K0_x",))
     two, all_of_it = Finding("trend", "two", harm=("K0_x", "K0_y")), Finding("trend", "all", harm=EVERYTHING)
-    gross = Finding("sign_suspect", "gross", harm=("acc_x",))
-    ordered = [gross, all_of_it, two, one, none]
+    gross, kept = (Finding("sign_suspect", "gross", harm=harm) for harm in (("acc_x",), ()))
+    asking = Finding("gap", "none", action="look")
+    ordered = [gross, all_of_it, two, one, kept, asking, none]
     assert most_harmful(reversed(ordered)) == ordered
 
 
@@ -80,9 +81,9 @@ def test_the_terminal_tells_three_and_counts_the_others(output, more, capsys):
     findings = [Finding("gap", f"gap {k}") for k in range(4)]
     say_findings([*findings, WEAK, Finding("outlier", "one", harm=("K0_x",))], output)
     told = capsys.readouterr().err.splitlines()
-    assert told == ["outlier: one", "gap: gap 0", "gap: gap 1", f"3 more findings: {more}"]
-    say_findings([WEAK], output)
-    assert capsys.readouterr().err.splitlines() == [WEAK.line]
+    assert told == ["outlier: one", WEAK.line, "gap: gap 0", f"3 more findings: {more}"]
+    say_findings(findings, output)
+    assert capsys.readouterr().err.splitlines() == [each.line for each in findings]
 
 
 def test_a_page_has_headline_action_and_table():

@@ -238,11 +238,13 @@ def _cell(value: Any) -> str:
 
 
 def most_harmful(findings: Iterable[Finding]) -> list[Finding]:
-    """The findings, those first that may shift most values; gross faults ahead of all."""
+    """The findings, those first that may shift most values, gross faults ahead of all; of those that shift none, gross
+    faults, then what asks for something."""
 
-    def order(finding: Finding) -> tuple[bool, float]:
+    def order(finding: Finding) -> tuple[bool, float, bool, bool]:
         values = math.inf if finding.harm == EVERYTHING else len(finding.harm)
-        return not (CODES[finding.code].gross and finding.harm), -values
+        gross = CODES[finding.code].gross
+        return not (gross and finding.harm), -values, not gross, not finding.action
 
     return sorted(findings, key=order)
 

@@ -23,18 +23,19 @@ _SHOWN = 3
 
 
 def say_findings(findings: Iterable[Finding], output: Output) -> None:
-    """The findings that harm most, one a line with its action, and how many more there are."""
+    """The findings that harm most, one a line with its action, and how many more there are.
+
+    A single one more is told itself, in the place of the line that would count it.
+    """
     from inercal.findings import most_harmful
-    from inercal.records.places import counted
 
     ordered = most_harmful(findings)
-    for finding in ordered[:_SHOWN]:
+    told = len(ordered) if len(ordered) <= _SHOWN + 1 else _SHOWN
+    for finding in ordered[:told]:
         output.say_finding(finding)
-    if len(ordered) > _SHOWN:
+    if len(ordered) > told:
         whole = "--report and --json have all" if isinstance(output, ReportOutput) else "--json has all"
-        output.say(
-            f"{counted(len(ordered) - _SHOWN, 'more finding')}: {'in the JSON' if output.json else whole}"
-        )
+        output.say(f"{len(ordered) - told} more findings: {'in the JSON' if output.json else whole}")
 
 
 def emit(estimate: Estimate, text: str, output: Output) -> None:

@@ -106,13 +106,13 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     if worst is None:
         return []
     shift, name, found = worst
-    what = f"an axis of {name} that is turned by {math.degrees(UNSEEN_AXIS):g} deg"
+    what = f"an axis of {name} turned by {math.degrees(UNSEEN_AXIS):g} deg"
     return [_weak(what, shift, found, "Fit the axes to a reference angle, or move through more angles.")]
 
 
 def _weak(fault: str, shift: float, found: Effect, action: str) -> Finding:
     """``weak_test``: a fault that shifts the angle by ``shift`` [rad], unnoticed."""
-    size = f"{math.degrees(shift):.2g} deg, {found.ratio:.2g} times u"
+    size = f"{math.degrees(shift):.2g} deg ({found.ratio:.2g} u)"
     return Finding(
-        "weak_test", f"This motion cannot show {fault}: the angle shifts by {size}.", action=action
+        "weak_test", f"This motion hides {fault}, which shifts the angle by {size}.", action=action
     )
