@@ -52,11 +52,11 @@ REFUSED = Outcome("refused", 0.0, "", ())
 
 
 def said(findings: Iterable) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Codes of what does harm, and messages of the rest."""
+    """Codes of what does harm, and all texts of the rest."""
     findings = list(findings)
     return (
         tuple(sorted({each.code for each in findings if each.harm})),
-        tuple(each.message for each in findings if not each.harm),
+        tuple(str(each.to_json()) for each in findings if not each.harm),
     )
 
 

@@ -138,8 +138,8 @@ def campaign(draws: int, folder: Path, only: str, fault_only: str, out: Path) ->
 def told(estimate, fault: str) -> bool:
     """True where a finding says what such a fault would do without showing."""
     words = next(words for kind, words in WORDS.items() if fault.startswith(kind))
-    said = [finding.message for finding in estimate.findings if finding.code == "weak_test"]
-    return any(re.search(words, message) for message in said)
+    items = [item for finding in estimate.findings if finding.code == "weak_test" for item in finding.items]
+    return any(re.search(words, item["fault"]) for item in items)
 
 
 def of_sound(draws: int, folder: Path, only: str) -> None:

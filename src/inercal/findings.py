@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 
 class Harm(enum.Enum):
@@ -157,7 +159,11 @@ _UNSTATED = ("?",)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing worth knowing: a code of `CODES`, a sentence, and where it was seen.
+    """One thing worth knowing: a code of `CODES`, what it is and how bad, what to do about it, and where it was seen.
+
+    The ``headline`` has at most 20 words, no semicolon and no list; the ``action`` as many, and names a key, an option
+    or an act, and is empty only where nothing can be done. ``items`` are the rows of a table, a text or number [SI or
+    the unit of its heading] by heading, for pages and JSON.
 
     ``harm`` names what an effect outside the model may shift by more than its u: parameters, ``theta`` of angles,
     channels of a recording, or `EVERYTHING`. Always empty for a code that never does harm, and `EVERYTHING` if absent
@@ -165,9 +171,11 @@ class Finding:
     """
 
     code: str
-    message: str
+    headline: str
     where: str = ""
     harm: tuple[str, ...] = _UNSTATED
+    action: str = field(default="", kw_only=True)
+    items: tuple[Mapping[str, str | float], ...] = field(default=(), kw_only=True, hash=False)
 
     def __post_init__(self) -> None:
         """Refuse a code that is not in the table, and harm that its code rules out."""
@@ -178,6 +186,82 @@ class Finding:
             object.__setattr__(self, "harm", () if never else EVERYTHING)
         if never and self.harm:
             raise ValueError(f"findings of the code {self.code!r} do no harm, found {self.harm}")
+
+    @property
+    def message(self) -> str:
+        """Headline and action in one text."""
+        if not self.action:
+            return self.headline
+        return f"{self.headline}{' ' if self.headline.endswith('.') else ': '}{self.action}"
+
+    @property
+    def line(self) -> str:
+        """All but the items, for one line of a terminal."""
+        return f"{self.code}: {self.message}{f' ({self.where})' if self.where else ''}"
+
+    @property
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Headings and rows of the items as texts, numbers with three digits; no headings without items."""
+        heads = tuple(dict.fromkeys(head for item in self.items for head in item))
+        return heads, [tuple(_cell(item.get(head, "")) for head in heads) for item in self.items]
+
+    def to_json(self) -> dict[str, Any]:
+        """The finding as plain objects, its message among them."""
+        return {
+            "code": self.code,
+            "headline": self.headline,
+            "action": self.action,
+            "items": [dict(item) for item in self.items],
+            "message": self.message,
+            "where": self.where,
+            "harm": [name for name in self.harm if name not in EVERYTHING],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Finding:
+        """The inverse of `to_json`; until version 0.2.0 the message was all there was, and is the headline then.
+
+        Raises KeyError, TypeError or ValueError where something is missing or is not what it should be.
+        """
+        return cls(
+            data["code"],
+            data["headline"] if "headline" in data else data["message"],
+            data["where"],
+            tuple(data.get("harm", ())),
+            action=data.get("action", ""),
+            items=tuple(dict(item) for item in data.get("items", ())),
+        )
+
+
+def _cell(value: Any) -> str:
+    """A text, or a number with three digits."""
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def most_harmful(findings: Iterable[Finding]) -> list[Finding]:
+    """The findings, those first that may shift most values, gross faults ahead of all; of those that shift none, gross
+    faults, then what asks for something."""
+
+    def order(finding: Finding) -> tuple[bool, float, bool, bool]:
+        values = math.inf if finding.harm == EVERYTHING else len(finding.harm)
+        gross = CODES[finding.code].gross
+        return not (gross and finding.harm), -values, not gross, not finding.action
+
+    return sorted(findings, key=order)
+
+
+def with_alternatives(finding: Finding, others: Iterable[str]) -> Finding:
+    """The finding with ``others``, headlines of what explains the recording as well: counted in its headline, and named
+    in its items."""
+    named = [each for each in dict.fromkeys(others) if each != finding.headline]
+    if not named:
+        return finding
+    count = "1 other cause is" if len(named) == 1 else f"{len(named)} other causes are"
+    return replace(
+        finding,
+        headline=f"{finding.headline.removesuffix('.')} ({count} equally possible)",
+        items=(*finding.items, *({"equally possible": each} for each in named)),
+    )
 
 
 class Status(enum.Enum):

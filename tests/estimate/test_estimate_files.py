@@ -130,7 +130,9 @@ def test_keys_of_the_contract():
         ["name", "value", "u", "U", "k", "dof", "unit", "coverage_probability", "long_name", "unit_dsi"]
     ] * 2
     assert list(data["covariance"]) == ["names", "matrix"]
-    assert list(data["findings"][0]) == ["code", "message", "where", "harm"]
+    assert list(data["findings"][0]) == [
+        "code", "headline", "action", "items", "message", "where", "harm",
+    ]  # fmt: skip
     assert list(data["budget"][0]) == ["source", "type", "u", "unit", "share"]
     assert list(data["inputs"][0]) == ["path", "sha256"]
 
@@ -322,6 +324,8 @@ def test_what_was_wrong_is_said(tmp_path):
     assert "unknown finding code 'comet'" in damaged(
         path, findings=[{"code": "comet", "message": "", "where": ""}]
     )
+    for wrong in ({}, {"message": "", "items": ["gap"]}, {"message": "", "items": 5}):
+        assert str(path) in damaged(path, findings=[{"code": "gap", "where": ""} | wrong])
     assert "covariance does not belong" in damaged(path, parameters=[second, first])
     assert "reshape" in damaged(path, covariance={"names": ["K0_x", "K1_x"], "matrix": [[1.0]]})
     assert "too large" in damaged(path, parameters=[first | {"value": 10**400}, second])

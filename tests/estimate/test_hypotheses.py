@@ -128,9 +128,10 @@ def test_a_choice_among_the_likeliest_and_what_is_alike():
     fits, _ = search(measured(3, offset=5.0, slope=5.0), table, JUDGE, 1.0, 1, choose=choose)
     finding = fits[0].finding
     assert (finding.code, finding.harm) == ("unmodelled", ("*",))
-    assert finding.message.startswith(
-        "the line is off by 5: correct it; equally possible: the line is too steep by"
-    )
+    assert finding.headline.startswith("the line is off by 5")
+    assert finding.headline.endswith("equally possible)")
+    assert finding.action == "correct it"
+    assert finding.items[0]["equally possible"].startswith("the line is too steep by")
 
 
 def test_values_beyond_their_bounds_are_not_believed():

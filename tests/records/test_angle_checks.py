@@ -179,7 +179,7 @@ class TestShiftedCommands:
             late[rows:] = th[-1]
         (finding,) = check(triads(t, th=noisy(late), wc=wc))
         assert finding.code == "command_shift"
-        assert finding.message.endswith(f"by {abs(rows) * 0.2:.4g} s")
+        assert finding.headline.endswith(f"by {abs(rows) * 0.2:.4g} s.")
         assert ("follow" in finding.message) == (rows > 0)
 
     @pytest.mark.parametrize("dt", [0.01, 0.2])

@@ -224,7 +224,7 @@ class TestUnits:
     def test_gravity_in_another_unit_is_said(self, norm, unit, looks):
         (finding,) = check(self.triad(norm, unit))
         assert finding.code == "unit_suspect"
-        assert finding.message.endswith(f"{unit} looks like {looks}")
+        assert finding.headline.endswith(f"{unit} looks like {looks}.")
 
     @pytest.mark.parametrize(
         ("norm", "unit"), [(9.7, "m/s^2"), (1.02, "g"), (990.0, "mg"), (16384.0, "count"), (50.0, "g")]
@@ -241,7 +241,7 @@ class TestUnits:
         motion = np.sin(np.arange(self.N) / 50)
         (finding,) = check(columns(unit, gyro_y=largest * motion))
         assert finding.code == "unit_suspect"
-        assert finding.message.endswith(f"{unit} look like {looks}")
+        assert finding.headline.endswith(f"{unit} look like {looks}.")
         (factor,) = {column.unit.factor for column in columns(unit, gyro_y=motion).values()}
         assert check(columns(unit, gyro_y=np.deg2rad(4000.0) / factor * motion)) == ()
 

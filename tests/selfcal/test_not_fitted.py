@@ -42,8 +42,9 @@ def test_it_is_told_and_is_a_line_of_the_budget(sound):
     own, paper = sound
     (said,) = (each for each in own.findings if each.code == "considered")
     assert not said.harm
-    assert "ug/g^2 of K2_" in said.message
-    assert "(20 usual)" in said.message
+    (square,) = (item for item in said.items if item["error"].startswith("K2_"))
+    assert (square["unit"], square["usual"]) == ("ug/g^2", pytest.approx(20.0))
+    assert 0.0 < square["left"] < 20.0
     (line,) = (each for each in own.budget if each.source == "errors of the rig that are not fitted")
     by_filter = np.array([own.result["bounds"][name] for name in own.names])
     shares = np.array([line.share[name] for name in own.names])
@@ -75,6 +76,8 @@ def test_u_is_at_most_that_of_a_fit_with_all_of_them(sound, tmp_path):
 def test_what_is_stated_is_no_longer_considered(tmp_path):
     stated = '[model]\nk2 = "0(1) ug/g^2"\nlevers = "0(1) mm"\n'
     found = calibrated(tmp_path, more=stated)
-    (said,) = (each.message for each in found.findings if each.code == "considered")
-    assert "K2" not in said
-    assert "r_zz" not in said
+    (said,) = (each for each in found.findings if each.code == "considered")
+    errors = " ".join(item["error"] for item in said.items)
+    assert errors
+    assert "K2" not in errors
+    assert "r_zz" not in errors

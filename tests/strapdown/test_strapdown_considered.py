@@ -28,7 +28,9 @@ def test_drifts_that_no_test_shows_are_in_u_and_said():
     assert max(map(abs, errors.values())) < 3.5
     (finding,) = told(estimate)
     assert 'add "g_sensitivity" to terms' in finding.message
-    assert "1 deg/h/g usual" in finding.message
+    (item,) = finding.items
+    assert item["before"] == pytest.approx(1.0)
+    assert item["left by this recording"] < 1.0
     assert 0.3 * PER_G < estimate.result["drifts"]["left"] < 3.0 * PER_G
 
 

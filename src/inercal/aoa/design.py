@@ -275,9 +275,9 @@ def _missed(settings: AoaSettings, layout: Layout, wanted: float) -> Finding:
     left = settled_u(_times(settings, _FACTORS[0]), layout, undisturbed(settings, layout))
     text = (
         f"no accelerometers reach the wanted {_deg(wanted)} deg: with perfect ones {_deg(left)} deg are left, of "
-        "positions, gyro and motion: state these better under [prior] and [noise]"
+        "positions, gyro and motion"
     )
-    return Finding("goal_missed", text)
+    return Finding("goal_missed", text, action="state these better under [prior] and [noise]")
 
 
 def _places(layout: Layout) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
-from inercal.cli.outcome import emit
+from inercal.cli.outcome import emit, say_findings
 from inercal.errors import InercalError, InputError
 from inercal.estimate.table import aligned
 
@@ -140,7 +140,7 @@ def show(
         write_bytes(output.report, opened.objects.read(found.report))
     if output.out is not None:
         save(found.estimate, output.out)
-    output.say_findings(found.estimate.findings)
+    say_findings(found.estimate.findings, output)
     for what, path in (("result", output.out), ("report", output.report)):
         if path is not None:
             output.say(f"{what}: {path}")

@@ -78,15 +78,9 @@ class Output:
         if not self.quiet:
             print(printable(text), file=sys.stderr)
 
-    def say_findings(self, findings: Iterable[Finding]) -> None:
-        """Findings for people, one a line."""
-        for finding in findings:
-            self.say_finding(finding)
-
     def say_finding(self, finding: Finding) -> None:
         """A finding for people."""
-        where = f" ({finding.where})" if finding.where else ""
-        self.say(f"{finding.code}: {finding.message}{where}")
+        self.say(finding.line)
 
     def emit(self, data: Mapping[str, Any], text: str) -> None:
         """The result on standard output: the JSON object, or the text for people."""

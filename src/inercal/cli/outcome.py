@@ -13,9 +13,29 @@ from inercal.cli.options import Output, ReportOutput, ResultOutput
 if TYPE_CHECKING:
     from inercal.estimate.result import Estimate
     from inercal.face.result import Result
+    from inercal.findings import Finding
 
 WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
+
+_SHOWN = 3
+"""Findings told one by one beside a result, those that harm most; more would hide the verdict below them."""
+
+
+def say_findings(findings: Iterable[Finding], output: Output) -> None:
+    """The findings that harm most, one a line with its action, and how many more there are.
+
+    A single one more is told itself, in the place of the line that would count it.
+    """
+    from inercal.findings import most_harmful
+
+    ordered = most_harmful(findings)
+    told = len(ordered) if len(ordered) <= _SHOWN + 1 else _SHOWN
+    for finding in ordered[:told]:
+        output.say_finding(finding)
+    if len(ordered) > told:
+        whole = "--report and --json have all" if isinstance(output, ReportOutput) else "--json has all"
+        output.say(f"{len(ordered) - told} more findings: {'in the JSON' if output.json else whole}")
 
 
 def emit(estimate: Estimate, text: str, output: Output) -> None:
@@ -54,7 +74,7 @@ def hand_over(
             save(estimate, output.out)
     if output.report is not None and report is not None:
         write_text(output.report, report)
-    output.say_findings(estimate.findings)
+    say_findings(estimate.findings, output)
     for written, path in ((what, output.out), ("report", output.report)):
         if path is not None:
             output.say(f"{written}: {path}")

@@ -50,9 +50,7 @@ def inspect(
     if output.report is not None:
         write_text(output.report, render_inspection(record, estimate, inspection_pictures(record)))
         output.say(f"report: {output.report}")
-    findings = [f"{f.code}: {f.message}{f' ({f.where})' if f.where else ''}" for f in record.findings] or [
-        words
-    ]
+    findings = [finding.line for finding in record.findings] or [words]
     emit(estimate, "\n".join([channels_table(record).text(), "", *findings]), output)
 
 

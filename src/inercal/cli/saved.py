@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
-from inercal.cli.outcome import WHOLE, emit, give
+from inercal.cli.outcome import WHOLE, emit, give, say_findings
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.errors import InputError
 
@@ -54,7 +54,7 @@ def apply(
         file = streamed(files)
         streaming.check(output, (calibration, file, map_file))
         model, findings, _ = usable(calibration, uncertainty)
-        output.say_findings(findings)
+        say_findings(findings, output)
         run_stream(
             lambda lines: Apply(lines, model, invert, output.say_finding), file, map_file, output, streaming
         )
@@ -75,7 +75,7 @@ def apply(
     with reading(output) as progress:
         write_record(record, output.out, progress)
     findings += worth_saying(record, estimate)
-    output.say_findings(findings)
+    say_findings(findings, output)
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
@@ -176,7 +176,7 @@ def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     """The calibration, to its file and as a table."""
     from inercal.estimate.files import save
 
-    output.say_findings(estimate.findings)
+    say_findings(estimate.findings, output)
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"calibration: {output.out}")
@@ -188,7 +188,7 @@ def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: Fi
     from inercal._files import write_text
 
     estimate = converted.estimate
-    output.say_findings(estimate.findings)
+    say_findings(estimate.findings, output)
     if output.out is None:
         written = {}
         text = "\n".join(converted.texts.values()).rstrip("\n")

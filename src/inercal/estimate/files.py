@@ -16,7 +16,7 @@ from inercal.arrays import Array
 from inercal.errors import InputError
 from inercal.estimate.budget import BudgetItem
 from inercal.estimate.result import COVERAGE, Estimate
-from inercal.findings import EVERYTHING, Finding, Status
+from inercal.findings import Finding, Status
 from inercal.inputs import Source
 from inercal.instruments.dsi import stated
 from inercal.instruments.terms import term
@@ -44,15 +44,7 @@ def to_json(estimate: Estimate) -> dict[str, Any]:
             "matrix": estimate.covariance,
             **({} if estimate.common is None else {"common": estimate.common}),
         },
-        "findings": [
-            {
-                "code": f.code,
-                "message": f.message,
-                "where": f.where,
-                "harm": [n for n in f.harm if n not in EVERYTHING],
-            }
-            for f in estimate.findings
-        ],
+        "findings": [finding.to_json() for finding in estimate.findings],
         "statistics": estimate.statistics,
         "budget": [
             {
@@ -117,10 +109,7 @@ def from_json(data: Mapping[str, Any]) -> Estimate:
         dof=np.array([math.inf if p.get("dof") is None else float(p["dof"]) for p in parameters]),
         status=Status(data["status"]["code"]),
         message=str(data["status"]["message"]),
-        findings=tuple(
-            Finding(f["code"], f["message"], f["where"], tuple(f.get("harm", ())))
-            for f in data.get("findings", ())
-        ),
+        findings=tuple(Finding.from_json(finding) for finding in data.get("findings", ())),
         statistics={key: _number(value) for key, value in data.get("statistics", {}).items()},
         budget=tuple(
             BudgetItem(b["source"], b["type"], _number(b["u"]), b["unit"], b["share"], bool(b.get("redrawn")))

@@ -15,14 +15,14 @@ inequality), and twice its logarithm is the fall of the sum of squares.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from inercal.arrays import Array
-from inercal.findings import EVERYTHING, Finding
+from inercal.findings import EVERYTHING, Finding, with_alternatives
 
 Case = TypeVar("Case")
 AnyCase = TypeVar("AnyCase", contravariant=True)
@@ -39,16 +39,14 @@ ROUNDS = 10
 FLAT = 1e-12
 """Strength of a combination of parameters, over that of each alone, below which it has no effect."""
 
-SHOWN = 3
-"""Hypotheses named at most as equally possible."""
-
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis(Generic[Case]):
     """One explanation of the misfit of a case.
 
     Each ``name`` is looked for once; ``code``, ``where`` and ``harm`` are those of the finding. ``says`` is its
-    sentence, or makes that of what was fitted; the part up to a colon says what, the rest what to do. ``without`` gives
+    sentence, or makes that of what was fitted; the part up to the first colon says what and
+    how much, the rest what to do. ``items`` are rows of a table for the finding. ``without`` gives
     the case as it would be without an error of some ``parameters`` (m,), each near 0; there may be none.
 
     Of a parameter [SI], ``step`` is the change for the derivative, ``bounds`` are the values that are believed,
@@ -72,6 +70,7 @@ class Hypothesis(Generic[Case]):
     where: str = ""
     harm: tuple[str, ...] = EVERYTHING
     derivative: Callable[[Case], Array] | None = None
+    items: Callable[[Fitted[Case]], tuple[Mapping[str, str | float], ...]] = lambda _: ()
 
     def chance(self, risk: float) -> float:
         """Fall of the sum of squares that chance exceeds with the probability ``risk`` at most."""
@@ -103,11 +102,11 @@ class Fitted(Generic[Case]):
 
     @property
     def finding(self) -> Finding:
-        """The sentence, with the equally possible ones."""
-        others = dict.fromkeys(each.sentence.split(":")[0] for each in self.alike)
-        also = f"; equally possible: {'; '.join([*others][:SHOWN])}" if others else ""
+        """The sentence in its two parts, with those of the equally possible ones."""
         of = self.hypothesis
-        return Finding(of.code, self.sentence + also, of.where, of.harm)
+        what, _, remedy = self.sentence.partition(": ")
+        found = Finding(of.code, what, of.where, of.harm, action=remedy, items=of.items(self))
+        return with_alternatives(found, (each.sentence.partition(": ")[0] for each in self.alike))
 
 
 class Judge(Protocol[AnyCase]):

@@ -216,10 +216,7 @@ class Result:
         """The verdict, the picture and the table, for a notebook."""
         picture = self.view.picture()
         mood = {Status.OK: "#2E7D4F", Status.ILL_CONDITIONED: "#B07A00"}.get(self.status, "#C03A2B")
-        items = "".join(
-            f"<li><code>{html.escape(each.code)}</code> {html.escape(each.message)}</li>"
-            for each in self.findings
-        )
+        items = "".join(map(_finding_as_html, self.findings))
         findings = (
             f"<details><summary>{counted(len(self.findings), 'finding')}</summary><ul>{items}</ul></details>"
         )
@@ -253,6 +250,19 @@ class Result:
             for head in ("", "value", "u", "U", "unit", "")
         )
         return f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _finding_as_html(finding: Finding) -> str:
+    """An item of a list: what was found, what to do about it, and the table of its items."""
+    action = f"<br>→ {html.escape(finding.action)}" if finding.action else ""
+    heads, rows = finding.table
+    table = "".join(
+        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in (heads, *rows)
+    )
+    return (
+        f"<li><code>{html.escape(finding.code)}</code> {html.escape(finding.headline)}{action}"
+        f"{f'<table>{table}</table>' if rows else ''}</li>"
+    )
 
 
 def coefficients(shown: Estimate) -> str:

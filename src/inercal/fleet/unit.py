@@ -303,7 +303,8 @@ def _renamed(estimate: Estimate, names: Mapping[str, str]) -> Estimate:
         estimate,
         message=named(estimate.message),
         findings=tuple(
-            replace(each, message=named(each.message), where=named(each.where)) for each in estimate.findings
+            replace(each, headline=named(each.headline), action=named(each.action), where=named(each.where))
+            for each in estimate.findings
         ),
         inputs=tuple(replace(each, path=names.get(each.path, each.path)) for each in estimate.inputs),
     )

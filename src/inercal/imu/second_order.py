@@ -41,8 +41,8 @@ def k2_finding(
     unit, factor = shown_unit("1/(m/s^2)")
     yield Finding(
         "unmodelled_k2",
-        f"u allows for second-order coefficients K2 of the accelerometers of 0 ± {size / factor:.0f} {unit}, as is "
-        f"ordinary; without them u({names[worst]}) would be {np.sqrt(1.0 - part[worst]):.2g} of what it is: state "
-        f'what the data sheet says, such as imu.k2 = "0(20) {unit}"{cure and f", or {cure}"}',
+        f"Most of u({names[worst]}) is a guess about nonlinearity (K2 = 0 ± {size / factor:.0f} {unit}), and falls to "
+        f"{100.0 * np.sqrt(1.0 - part[worst]):.2g} % without.",
         harm=(),
+        action=f'State the K2 of the data sheet, such as imu.k2 = "0(20) {unit}"{cure and f", or {cure}"}.',
     )

@@ -107,7 +107,7 @@ def noise_of(record: Record) -> Noise:
     noise_coefficients(allan_deviation(np.sin(np.arange(64.0) ** 2), 1.0))  # loads or compiles kernels
     clock = time.perf_counter()
     channels: list[ChannelNoise] = []
-    channels_of: dict[tuple[str, str], list[str]] = {}
+    channels_of: dict[Finding, list[str]] = {}
     findings: list[Finding] = []
     disturbed: dict[str, Unrest] = {}
     for columns in groups:
@@ -116,7 +116,7 @@ def noise_of(record: Record) -> Noise:
         for at, column in enumerate(columns):
             fit, own = _fitted(curve, at)
             for each in own:
-                channels_of.setdefault((each.code, each.message), []).append(column.name)
+                channels_of.setdefault(each, []).append(column.name)
             channels.append(ChannelNoise(column.name, column.sensor, column.unit.si, curve, at, fit))
             disturbance = unrest(samples[:, at], interval)
             if disturbance is not None:
@@ -124,7 +124,9 @@ def noise_of(record: Record) -> Noise:
                 harm = (column.name,) if disturbance.felt else ()
                 findings.append(Finding("not_at_rest", f"{column.name} {disturbance.words}", where, harm))
                 disturbed[column.name] = disturbance
-    of_fits = [Finding(code, f"{', '.join(names)}: {words}") for (code, words), names in channels_of.items()]
+    of_fits = [
+        replace(each, headline=f"{', '.join(names)}: {each.headline}") for each, names in channels_of.items()
+    ]
     estimate = _assemble(record, channels, [*of_fits, *findings], disturbed)
     return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
 

@@ -75,7 +75,7 @@ def _origin(record: Record) -> dict[str, str]:
     return {
         "inercal": __version__,
         "sources": json.dumps([vars(source) for source in record.sources]),
-        "findings": json.dumps([vars(finding) for finding in record.findings]),
+        "findings": json.dumps([finding.to_json() for finding in record.findings]),
     }
 
 

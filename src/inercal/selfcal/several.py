@@ -242,7 +242,7 @@ def _assembled(
     judged = observability(PathBounds(fit.names, by_records, fit.prior, np.empty((0, len(u)))), settings.goal)
     for part, each in zip(parts, alone, strict=True):
         told = (f for f in each.estimate.findings if f.code not in _OF_ONE)
-        findings += [replace(f, message=f"{part.name}: {f.message}") for f in told]
+        findings += [replace(f, headline=f"{part.name}: {f.headline}") for f in told]
     goal = reached(fit.names, uncertainty.u, settings.goal)
     findings += [*at_prior(judged.at_prior), *missed(goal, UNIT_OF)]
     findings += exact_inputs(exact, cure="state them with uncertainties, or as states")

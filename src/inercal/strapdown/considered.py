@@ -77,7 +77,15 @@ def _told(settings: StrapdownSettings, left: float, usual: float, names: list[st
     )
     return Finding(
         "considered",
-        f"drifts of the gyros by specific force are not fitted, and count in u of {counted_names(names, 6)}: this "
-        f"recording leaves {per_g * left:.2g} deg/h/g of them ({per_g * usual:.2g} deg/h/g {whence}); state "
-        f'prior.g_sensitivity if they are smaller, or add "{_TERM}" to terms',
+        f"Drifts of the gyros by specific force, {per_g * left:.2g} deg/h/g, are not fitted and count in u of "
+        f"{counted_names(names, 2)}.",
+        action=f'State prior.g_sensitivity if they are smaller, or add "{_TERM}" to terms.',
+        items=(
+            {
+                "drift by specific force": whence,
+                "left by this recording": per_g * left,
+                "before": per_g * usual,
+                "unit": "deg/h/g",
+            },
+        ),
     )

@@ -284,9 +284,9 @@ def _too_quiet(fit: Fit) -> list[Finding]:
         return []
     text = (
         f"chi-square {fit.chi2:.4g} is far below the {fit.dof:.0f} expected: the noise is stated too large, and "
-        "every u with it"
+        "every u with it."
     )
-    return [Finding("low_scatter", text)]
+    return [Finding("low_scatter", text, action="State the noise as it is under [noise].")]
 
 
 def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[Finding]:
@@ -317,8 +317,8 @@ def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Arr
         return []
     if not tested[0].significant:
         return [
-            Finding("unmodelled", f"terms leaves out {each.candidate.words}, which may be as large as their prior: "
-                    f"{each.candidate.advice}, or state a smaller prior.{each.candidate.name}", harm=harm)
+            Finding("unmodelled", f"terms leaves out {each.candidate.words}, which may be as large as their prior",
+                    action=f"{each.candidate.advice}, or state a smaller prior.{each.candidate.name}", harm=harm)
             for each in tested
             if each.candidate.name in USUAL
             and (harm := _beyond(found, np.linalg.norm(slope @ each.reach, axis=1), u))
@@ -330,10 +330,10 @@ def _shown(best: Tested, found: tuple[str, ...], slope: Array, u: Array) -> Find
     """The finding of an effect that the recording shows; it harms the values that it would shift by more than u."""
     candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), u)
     text = (
-        f"the recording shows {candidate.words}: chi-square falls by {best.drop:.4g} for "
-        f"{counted(len(candidate.prior), 'parameter')}; {candidate.advice}"
+        f"the recording shows {candidate.words} (chi-square falls by {best.drop:.4g} for "
+        f"{counted(len(candidate.prior), 'parameter')})"
     )
-    return Finding(candidate.code, text, harm=harm)
+    return Finding(candidate.code, text, harm=harm, action=candidate.advice)
 
 
 def _beyond(found: tuple[str, ...], shift: Array, u: Array) -> tuple[str, ...]:
@@ -347,8 +347,8 @@ def _beyond_prior(found: tuple[str, ...], off: Array, prior_u: Array, u: Array) 
     names_far = [name for name, each in zip(found, far.tolist(), strict=True) if each]
     if not names_far:
         return []
-    text = f"{counted_names(names_far, 6)}: far outside the stated prior; widen it, or check units and signs"
-    return [Finding("prior_suspect", text)]
+    text = f"{counted_names(names_far, 6)} far outside the stated prior"
+    return [Finding("prior_suspect", text, action="widen it, or check units and signs")]
 
 
 def _verdict(

@@ -11,11 +11,11 @@ from inercal.findings import Finding
 from inercal.studies.text import changed, parsed
 from inercal.workbench.form import problem
 
-_SET = re.compile(r"\bset ([a-z_]\w*(?:\.\w+)+) = (true|false|\"[^\"]*\"|[-+.\de]+\d)")
+_SET = re.compile(r"\b[Ss]et ([a-z_]\w*(?:\.\w+)+) = (true|false|\"[^\"]*\"|[-+.\de]+\d)")
 _UNDER = re.compile(
-    r"\b(?:write|state|take) (\w+) = (\"[^\"]*\"|true|false|[-+.\de]*\d)[^;\[]{0,60}? under \[([\w.]+)\]"
+    r"\b(?:[Ww]rite|[Ss]tate|[Tt]ake) (\w+) = (\"[^\"]*\"|true|false|[-+.\de]*\d)[^;\[]{0,60}? under \[([\w.]+)\]"
 )
-_STATES = re.compile(r"\bname (?!them\b)([\w, ]+?) in states under \[model\]")
+_STATES = re.compile(r"\b[Nn]ame (?!them\b)([\w, ]+?) in states under \[model\]")
 """The words in which findings say what to write: a key and its value, or kinds of states of a platform."""
 
 

@@ -207,10 +207,10 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
     findings, band, flexure = [], decided.band, decided.prior.heave
     if settings.band.low_pass is None and len(band.sections) > len(settings.band.notch):
         text = (
-            "the sensors feel vibration that is no motion of the model, and the fusion takes what is left of them "
-            f"without it: to have the same band again write {band.words} under [band]"
+            "the sensors feel vibration that is no motion of the model, and the fusion takes them without it"
         )
-        findings.append(Finding("band_limited", text))
+        action = f"to have the same band again write {band.words} under [band]"
+        findings.append(Finding("band_limited", text, action=action))
     if left := band.left_out:
         text = (
             f"{', '.join(f'{each:.4g} Hz' for each in left)} under [band] is left out: of {band.rate:.4g} rows a "
@@ -220,7 +220,10 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
     if flexure.frequency != settings.prior.heave.frequency:
         text = (
             f"the support {'plunges' if flexure.vertical else 'shakes the model beyond its usual flexure'}, and u "
-            f'allows for it: to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
+            "allows for it"
+        )
+        action = (
+            f'to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
             f'damping = "{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g"'
             + (
                 ', direction = "vertical" under [prior.heave]'
@@ -228,14 +231,14 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
                 else " under [prior.heave] and [prior.axial]"
             )
         )
-        findings.append(Finding("wide_flexure", text))
+        findings.append(Finding("wide_flexure", text, action=action))
     if decided.prior.gyro_scale != settings.prior.gyro_scale:
         text = (
             f"the recording contradicts a gyro whose scale is known to {100.0 * settings.prior.gyro_scale:g} %, and u "
-            f'allows for {100.0 * decided.prior.gyro_scale:g} %: calibrate it, or write gyro_scale = "'
-            f'{100.0 * decided.prior.gyro_scale:g} %" under [prior]'
+            f"allows for {100.0 * decided.prior.gyro_scale:g} %"
         )
-        findings.append(Finding("wide_gyro_scale", text))
+        action = f'calibrate it, or write gyro_scale = "{100.0 * decided.prior.gyro_scale:g} %" under [prior]'
+        findings.append(Finding("wide_gyro_scale", text, action=action))
     return findings
 
 
@@ -256,20 +259,23 @@ def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult
             side = "later" if delay.value > 0.0 else "earlier"
             text = (
                 f"gyro comes {1e3 * abs(delay.value):.2g} ms {side} than the accelerometers by the spectra, which the "
-                f'fusion does not learn: write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
+                "fusion does not learn"
             )
-            return [Finding("command_shift", text, harm=EVERYTHING)]
+            action = f'write gyro_delay = "{1e3 * delay.value:.3g} ms" under [timing]'
+            return [Finding("command_shift", text, harm=EVERYTHING, action=action)]
     late = -tau - constants.common_delay
     late_u = math.hypot(math.sqrt(filtered.state.P[k, k]), constants.common_delay_u)
     if not (late > LIMITS.delay_sigmas * late_u and late * rate > u):
         return []
     text = (
-        f"accelerometers come {-1e3 * tau:.2g} ms later than the gyro, and the angle with them: "
-        f"{math.degrees(late * rate):.2g} deg at the rates of this recording; write "
-        f'common_delay = "{-1e3 * tau:.3g} ms" under [timing], or gyro_delay = "{1e3 * tau:.3g} ms" there where it is '
-        "the stamps of the gyro that are early"
+        f"accelerometers come {-1e3 * tau:.2g} ms later than the gyro, and the angle with them, by "
+        f"{math.degrees(late * rate):.2g} deg at these rates"
     )
-    return [Finding("command_shift", text, harm=EVERYTHING)]
+    action = (
+        f'write common_delay = "{-1e3 * tau:.3g} ms" under [timing], or gyro_delay = "{1e3 * tau:.3g} ms" there where '
+        "the gyro is early"
+    )
+    return [Finding("command_shift", text, harm=EVERYTHING, action=action)]
 
 
 def _fair(part: Recording, settings: AoaSettings) -> AoaSettings:

@@ -73,13 +73,18 @@ def of_flexure(
     found = effect(estimate(part, problem), estimate(part, _more_flexible(problem, times)), part.t)
     if found is None:
         return []
-    advice = "; state [prior.heave] and [prior.axial] as the report shows them" if found.harm else ""
+    advice = "state [prior.heave] and [prior.axial] as the report shows them" if found.harm else ""
     text = (
-        f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms: allowing for twice as much would move "
-        f"the angle by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u, and make u "
-        f"{math.sqrt(1.0 + max(found.lack**2 - found.ratio**2, 0.0)):.2g} times as large{advice}"
+        f"the sting shakes the sensors by {rms / STANDARD_GRAVITY:.2g} g rms, and twice as much moves the angle "
+        f"by {found.ratio:.2g} u"
     )
-    return [Finding("flexure", text, harm=found.harm)]
+    larger = math.sqrt(1.0 + max(found.lack**2 - found.ratio**2, 0.0))
+    allowed: dict[str, str | float] = {
+        "allowing for": "twice the flexure",
+        "moves the angle by [deg]": math.degrees(found.shift),
+        "makes u larger by": larger,
+    }
+    return [Finding("flexure", text, harm=found.harm, action=advice, items=(allowed,))]
 
 
 def of_noise(
@@ -91,8 +96,10 @@ def of_noise(
     found = effect(estimate(part, plain), estimate(part, fair), part.t)
     if found is None or found.harm:
         return noise
-    text = f"; so far it costs {math.degrees(found.u * found.lack):.2g} deg, {found.lack:.2g} times u"
-    return [replace(each, message=each.message + text, harm=()) if each.harm else each for each in noise]
+    cost = f"so far it costs {math.degrees(found.u * found.lack):.2g} deg, {found.lack:.2g} times u"
+    return [
+        replace(each, headline=f"{each.headline} ({cost})", harm=()) if each.harm else each for each in noise
+    ]
 
 
 def _flexure(problem: FilterProblem, filtered: FilterResult) -> float:

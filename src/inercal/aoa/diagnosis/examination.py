@@ -148,9 +148,9 @@ def _far_away(settings: AoaSettings) -> list[Finding]:
         return []
     text = (
         f"{layout.names[k]} is stated {abs(arm):g} m from the pivot, where arms of models are "
-        f"shorter than {IMPOSSIBLE_ARM:g} m: write r with its unit"
+        f"shorter than {IMPOSSIBLE_ARM:g} m"
     )
-    return [Finding("unit_suspect", text, harm=EVERYTHING)]
+    return [Finding("unit_suspect", text, harm=EVERYTHING, action="write r with its unit")]
 
 
 def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
@@ -159,11 +159,9 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
     if _upright(now) > LIMITS.upside_down_cosine:
         return []
     middle = math.degrees(float(np.nanmedian(np.remainder(now.theta, 2.0 * math.pi))))
-    text = (
-        f"theta is about {middle:.0f} deg, the model on its back: exchange or reverse the accelerometers across it, or "
-        'state roll = "180 deg" under [model] if it was mounted so'
-    )
-    return [Finding("not_stated", text, harm=("theta",))]
+    text = f"theta is about {middle:.0f} deg, the model on its back"
+    action = 'exchange or reverse the accelerometers across it, or state roll = "180 deg" under [model]'
+    return [Finding("not_stated", text, harm=("theta",), action=action)]
 
 
 def diagnose(
@@ -211,7 +209,7 @@ def _of_snap(settings: AoaSettings, snap: float) -> Finding:
     """``unmodelled``: a larger snap makes a recording fit."""
     text = f"the model moves faster than a snap of {settings.estimator.density:.3g} rad^2/s^7 lets it"
     advice = f'write snap = "{snap:.3g} rad^2/s^7" or "auto" under [estimator]'
-    return Finding("unmodelled", f"{text}: {advice}", harm=EVERYTHING)
+    return Finding("unmodelled", text, harm=EVERYTHING, action=advice)
 
 
 def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
@@ -227,10 +225,11 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
     enough = next((states for states in larger if fit_quality(part, settings, states).fits), 19)
     at_least = "" if enough == 19 else f" ({enough} at least)"
     text = (
-        f"the recording shows {_BESIDE[enough]}, which {chosen} states leave out: their angle is wrong by more than it "
-        f"claims, write states = 19{at_least} under [estimator]"
+        f"the recording shows {_BESIDE[enough]}, which {chosen} states leave out, and the angle is wrong by more "
+        "than it claims"
     )
-    return [Finding("unmodelled", text, harm=EVERYTHING)]
+    action = f"write states = 19{at_least} under [estimator]"
+    return [Finding("unmodelled", text, harm=EVERYTHING, action=action)]
 
 
 def _errors(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
@@ -251,12 +250,11 @@ def _contradiction(part: Recording, settings: AoaSettings, now: FitQuality) -> F
             acc = part.acc.copy()
             acc[:, k] = np.nan
             if fit_quality(replace(part, acc=acc), settings).fits:
-                text = f"{name} contradicts the others, which fit without it: check its channel, axis and position"
-                return Finding("contradiction", text, harm=EVERYTHING)
+                text = f"{name} contradicts the others, which fit without it"
+                action = "check its channel, axis and position"
+                return Finding("contradiction", text, harm=EVERYTHING, action=action)
     worst = (*names, "gyro")[int(np.argmax(now.by_sensor))]
     motion = "" if part.spatial else ", or the model rolls or yaws, which only gyro_roll and gyro_yaw tell"
-    text = (
-        f"the sensors contradict each other, {worst} most, and no single error explains it: check the study's axes, "
-        f"positions and noise{motion}"
-    )
-    return Finding("contradiction", text, harm=EVERYTHING)
+    text = f"the sensors contradict each other, {worst} most, and no single error explains it{motion}"
+    action = "check the study's axes, positions and noise"
+    return Finding("contradiction", text, harm=EVERYTHING, action=action)

@@ -119,9 +119,8 @@ def of_prior(part: Recording, of: FilterProblem, settings: AoaSettings, found: S
         return []
     k = of.places.scale
     text = (
-        f"the gyro's scale looks off by {100.0 * found.value:.2g} % (u {100.0 * found.u:.1g} %), where "
-        f"{100.0 * math.sqrt(of.covariance[k, k]):.2g} % is allowed for, which shifts the angle by "
-        f"{math.degrees(cost.shift):.2g} deg, {cost.ratio:.2g} times u: state gyro_scale under [prior], or correct the "
-        "scale under [sensors.gyro]"
+        f"the gyro's scale looks off by {100.0 * found.value:.2g} % ({100.0 * math.sqrt(of.covariance[k, k]):.2g} % "
+        f"allowed for), which costs {math.degrees(cost.shift):.2g} deg ({cost.ratio:.2g} u)"
     )
-    return [Finding("prior_suspect", text, harm=EVERYTHING)]
+    action = "state gyro_scale under [prior], or correct the scale under [sensors.gyro]"
+    return [Finding("prior_suspect", text, harm=EVERYTHING, action=action)]

@@ -91,5 +91,6 @@ def _finding(code: str, key: str, names: list[str], ratio: float, nominal: float
     unit, size = ("g", STANDARD_GRAVITY) if key == "accelerometer" else ("deg/s", math.pi / 180.0)
     now, then = f"{nominal / size:.3g} {unit}", f"{ratio * nominal / size:.2g} {unit}"
     harm = EVERYTHING if code == "excess_scatter" else ()
-    text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states: write {key} = "
-    return Finding(code, f'{text}"{then}" under [noise], unless its unit is wrong', harm=harm)
+    text = f"{', '.join(names)}: noise is {ratio:.2g} times the {now} that the study states"
+    action = f'write {key} = "{then}" under [noise], unless its unit is wrong'
+    return Finding(code, text, harm=harm, action=action)

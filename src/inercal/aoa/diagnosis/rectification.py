@@ -28,10 +28,10 @@ def of_rectification(recording: Recording, settings: AoaSettings, u: float) -> l
         else "write rectification under [noise], so that u has it"
     )
     text = (
-        f"accelerometers feel {math.sqrt(power) / STANDARD_GRAVITY:.2g} g rms above {LIMITS.lowest_line:g} Hz: a K2 of "
-        f"{1e6 * k2 * STANDARD_GRAVITY:.3g} ug/g^2 makes an offset of {math.degrees(off):.2g} deg of it; {advice}"
+        f"sensors feel {math.sqrt(power) / STANDARD_GRAVITY:.2g} g rms above {LIMITS.lowest_line:g} Hz: a K2 of "
+        f"{1e6 * k2 * STANDARD_GRAVITY:.3g} ug/g^2 shifts the angle by {math.degrees(off):.2g} deg"
     )
-    return [Finding("rectification", text, harm=EVERYTHING if off > u else ())]
+    return [Finding("rectification", text, harm=EVERYTHING if off > u else (), action=advice)]
 
 
 def with_offsets(recording: Recording, settings: AoaSettings) -> AoaSettings:

@@ -20,9 +20,12 @@ from inercal.aoa.limits import LIMITS
 from inercal.aoa.reading.recording import Recording
 from inercal.aoa.settings import AoaSettings
 from inercal.arrays import Array
-from inercal.estimate.hypotheses import SHOWN, Fits, Fitted, Hypothesis, search
+from inercal.estimate.hypotheses import Fits, Fitted, Hypothesis, search
 from inercal.findings import EVERYTHING
 from inercal.units import STANDARD_GRAVITY, Quantity, parse_unit
+
+_ALIKE = 3
+"""Errors told at most as equally possible: each is a run of the filter."""
 
 ALIKE_SQUARES = 4.0
 """Difference of the sums of squared innovations under two errors of which neither is likelier."""
@@ -64,7 +67,7 @@ def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
     """
 
     def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-        return _least(itertools.islice(fits, SHOWN + 1), _squares, ALIKE_SQUARES)
+        return _least(itertools.islice(fits, _ALIKE + 1), _squares, ALIKE_SQUARES)
 
     found, then = search(case, _beside_the_gyro, JUDGE, 1.0, 1, choose=likeliest)
     return found[-1] if found and _squares(then) < _squares(other) else None

@@ -64,12 +64,8 @@ def _scale(part: Recording, problem: FilterProblem, plain: FilterResult, own: Sc
     off = replace(part, gyro=(1.0 + size) * part.gyro)
     if (found := _told(part, off, problem, plain)) is None:
         return []
-    text = (
-        f"nothing in this motion would show a gyro whose scale is off by {100.0 * size:.2g} %, which shifts the angle "
-        f"by {math.degrees(found.shift):.2g} deg, {found.ratio:.2g} times u: verify it, or state a wider gyro_scale "
-        "under [prior]"
-    )
-    return [Finding("weak_test", text)]
+    what = f"a gyro whose scale is off by {100.0 * size:.2g} %"
+    return [_weak(what, found.shift, found, "Verify it, or state a wider gyro_scale under [prior].")]
 
 
 def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list[Finding]:
@@ -88,12 +84,8 @@ def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list
         return []
     shift, name, found = worst
     drift = 1e3 * LIMITS.unseen_drift / STANDARD_GRAVITY
-    text = (
-        f"nothing in this motion would show a bias of {name} that drifts by {drift:g} mg, which shifts the "
-        f"angle by {math.degrees(shift):.2g} deg, {found.ratio:.2g} times u: state accelerometer_walk under [noise] "
-        "where it may"
-    )
-    return [Finding("weak_test", text)]
+    what = f"a bias of {name} that drifts by {drift:g} mg"
+    return [_weak(what, shift, found, "State accelerometer_walk under [noise] where biases may drift.")]
 
 
 def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
@@ -114,9 +106,13 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     if worst is None:
         return []
     shift, name, found = worst
-    text = (
-        f"nothing in this motion would show an axis of {name} that is turned by "
-        f"{math.degrees(UNSEEN_AXIS):g} deg, which shifts the angle by {math.degrees(shift):.2g} deg, "
-        f"{found.ratio:.2g} times u: fit the axes to a reference angle, or move through more angles"
+    what = f"an axis of {name} turned by {math.degrees(UNSEEN_AXIS):g} deg"
+    return [_weak(what, shift, found, "Fit the axes to a reference angle, or move through more angles.")]
+
+
+def _weak(fault: str, shift: float, found: Effect, action: str) -> Finding:
+    """``weak_test``: a fault that shifts the angle by ``shift`` [rad], unnoticed."""
+    size = f"{math.degrees(shift):.2g} deg ({found.ratio:.2g} u)"
+    return Finding(
+        "weak_test", f"This motion hides {fault}, which shifts the angle by {size}.", action=action
     )
-    return [Finding("weak_test", text)]

@@ -24,7 +24,7 @@ def beyond_limits(angles: Angles, t: Array, settings: AoaSettings) -> list[Findi
     if not len(out):
         return []
     first = beyond(settings, table[out[0]].tolist(), float(t[out[0]]))
-    text = f"{first.message}; so are {counted(len(out), 'row')} of {len(t)}"
+    text = f"{first.headline}, and so are {counted(len(out), 'row')} of {len(t)}"
     return [Finding("beyond_limits", text, first.where)]
 
 

@@ -104,11 +104,9 @@ def left_at_prior(names: Sequence[str], ratio: Array, settings: AoaSettings) -> 
     left = [name for name, each in zip(names, ratio, strict=True) if each > UNSEEN and name not in known]
     if not left:
         return None
-    text = (
-        f"{counted_names(left, 8)}: no better known than before, as is common; a sweep of pitch shows biases, "
-        "oscillation lever arms, heights and the gyro's scale"
-    )
-    return Finding("at_prior", text)
+    text = f"{counted_names(left, 8)}: no better known than before, as is common"
+    action = "a sweep of pitch shows biases, oscillation shows lever arms, heights and the gyro's scale"
+    return Finding("at_prior", text, action=action)
 
 
 def _because(text: str, findings: Sequence[Finding]) -> str:

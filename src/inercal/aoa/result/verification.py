@@ -78,11 +78,12 @@ def late_reference(recording: Recording, angles: Angles) -> list[Finding]:
     if small or explained < LIMITS.explained_share * float(off @ off):
         return []
     side = "later" if delay > 0.0 else "earlier"
-    text = (
-        f"theta_ref comes {1e3 * abs(delay):.2g} ms {side} than the angle: correct its clock, or state under [timing] "
-        f"the common_delay of the sensors where it is they that are {'early' if delay > 0.0 else 'late'}"
+    text = f"theta_ref comes {1e3 * abs(delay):.2g} ms {side} than the angle"
+    action = (
+        "correct its clock, or state under [timing] the common_delay of the sensors where it is they that are "
+        f"{'early' if delay > 0.0 else 'late'}"
     )
-    return [Finding("contradiction", text, harm=("theta",))]
+    return [Finding("contradiction", text, harm=("theta",), action=action)]
 
 
 def _error(off: Array, u: Array) -> AngleError:

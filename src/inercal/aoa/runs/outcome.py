@@ -72,7 +72,7 @@ def _named(found: Sequence[tuple[str, Finding]]) -> list[Finding]:
         harm = tuple(one for one in each.harm if one == "theta")
         files.setdefault(replace(each, harm=harm), []).append(name)
     return [
-        replace(each, message=f"{counted_names(list(dict.fromkeys(names)), 4)}: {each.message}")
+        replace(each, headline=f"{counted_names(list(dict.fromkeys(names)), 4)}: {each.headline}")
         for each, names in files.items()
     ]
 

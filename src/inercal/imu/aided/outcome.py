@@ -76,7 +76,9 @@ def assemble(
     plain = combine(names, [*sources_a, *sources_b])
     u = dict(zip(of_imu, plain.u.tolist(), strict=False))
     judged = verdict(fit, dict(zip(of_imu, values.tolist(), strict=False)), u, len(rests), faulty)
-    sources_b += [TypeB(f"misfit ({each.code})", 1.0, "1", each.shift, redrawn=True) for each in faulty]
+    sources_b += [
+        TypeB(f"misfit ({each.finding.code})", 1.0, "1", each.shift, redrawn=True) for each in faulty
+    ]
     symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
     units = [
         TERMS[name].unit_for(symbols["gyro" if name.startswith(("D_", "S_", "T_", "G_")) else "acc"])

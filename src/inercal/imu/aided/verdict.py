@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,7 @@ def verdict(
         if fault.part > LIMITS.fault_part and np.any(
             np.abs(fault.shift[: len(limit)]) > LIMITS.fault_shift * limit
         ):
-            return Status.INCONSISTENT, fault.message
+            return Status.INCONSISTENT, fault.finding.message
     for triad in triads:
         wrong = _unit_words(fit, triad)
         if wrong:
@@ -49,7 +50,7 @@ def verdict(
         noise = sensor.noise.resting / np.sqrt(np.median(sensor.side.blocks.length))
         shifts = sensor.noise.excess > 0.0 and _shift(sensor) > LIMITS.turning_shift * size
         if faults and (shifts or left > max(LIMITS.turning_residual * size, LIMITS.fault_shift * noise)):
-            return Status.INCONSISTENT, faults[0].message
+            return Status.INCONSISTENT, faults[0].finding.message
         if shifts or left > max(LIMITS.turning_residual * size, LIMITS.fault_shift * noise):
             part = 100.0 * (_shift(sensor) if shifts else left) / size
             return (
@@ -170,8 +171,9 @@ def findings(
     """
     for fault in faults:
         # where u allows for a fault, sensors and table do not contradict each other
-        code = "unmodelled" if sound and fault.code == "contradiction" else fault.code
-        yield Finding(code, f"{fault.message}; the uncertainties allow for it", harm=())
+        found = fault.finding
+        code = "unmodelled" if sound and found.code == "contradiction" else found.code
+        yield replace(found, code=code, headline=f"{found.headline}, which u allows for", harm=())
     for triad in fit.identified:
         blocks = of_triad(fit, triad)[0].side.blocks
         if blocks.clipped:

@@ -274,10 +274,11 @@ def _calibrate_gyro(
         miss = rms_miss(gyro)
     if gyro is None or not gyro.converged or miss > LIMITS.vertical_miss:
         text = (
-            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg (rms of the verticals "
-            "carried through the turns): check the gyro's signs and order of axes; it is not calibrated"
+            f"gyro and accelerometers contradict each other by {np.degrees(miss):.0f} deg rms after turns, and the "
+            "gyro is not calibrated"
         )
+        action = "check its signs and order of axes in the map"
         axes = axis_findings(turns, acc.directions, means[0])
-        return None, [*findings, Finding("contradiction", text, harm=EVERYTHING), *axes]
+        return None, [*findings, Finding("contradiction", text, harm=EVERYTHING, action=action), *axes]
     findings += gyro_findings(poses, drivers, means - gyro.by_earth, recording)
     return gyro, findings

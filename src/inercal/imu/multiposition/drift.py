@@ -75,7 +75,8 @@ def bias_drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Unce
     """
     return Finding(
         "bias_drift",
-        f"the biases of the accelerometers drift over the recording by {in_words(found.shown)} {unit}: {_CURE}",
+        f"the biases of the accelerometers drift over the recording by {in_words(found.shown)} {unit}",
+        action=_CURE,
         harm=harmed(found, joint.names, uncertainty.u),
     )
 
@@ -99,7 +100,8 @@ def gyro_scale_drift(
     shifts = dict(zip(gyro.names, found.shifts @ found.estimate, strict=False))
     yield Finding(
         "trend",
-        f"the scale factors of the gyro change over the recording by {in_words(found, _PPM)} ppm: {_CURE}",
+        f"the scale factors of the gyro change over the recording by {in_words(found, _PPM)} ppm",
+        action=_CURE,
         harm=tuple(
             name for name, u in zip(names, uncertainty.u, strict=True) if abs(shifts.get(name, 0.0)) > u
         ),
@@ -110,7 +112,7 @@ def scale_drift_finding(joint: Joint, found: Tested, uncertainty: Uncertainty) -
     """The finding about scale factors that drift; harm as with biases."""
     return Finding(
         "trend",
-        f"the scale factors of the accelerometers change over the recording by {in_words(found.shown, _PPM)} ppm: "
-        f"{_CURE}",
+        f"the scale factors of the accelerometers change over the recording by {in_words(found.shown, _PPM)} ppm",
+        action=_CURE,
         harm=harmed(found, joint.names, uncertainty.u),
     )

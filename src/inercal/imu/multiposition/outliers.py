@@ -79,9 +79,9 @@ def outlier_finding(
     way = "smaller" if shifts[worst] > 0 else "larger"
     return Finding(
         code,
-        f"{len(places)} {lie} off what all others say ({counted_names(times)}); without {it} {worst} would be "
-        f"{abs(shifts[worst]):.1f} u {way}: look for a knock or a hand that moved, and leave {it} out by imu.exclude = "
-        f"[{listed}]",
+        f"{len(places)} {lie} off what all others say ({counted_names(times)}), without {it} {worst} would be "
+        f"{abs(shifts[worst]):.1f} u {way}",
         "; ".join(times),
         harm=harm,
+        action=f"look for a knock or a hand that moved, and leave {it} out by imu.exclude = [{listed}]",
     )

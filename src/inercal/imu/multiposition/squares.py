@@ -83,9 +83,9 @@ def squares_finding(
         words = in_words(found.shown, unit[1])
         yield Finding(
             "unmodelled_k2",
-            f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}) that are not "
-            "fitted: set imu.k2 = true",
+            f"the poses show second-order coefficients K2 of the accelerometers ({words} {unit[0]}), not fitted",
             harm=harmed(found, names, u),
+            action="set imu.k2 = true",
         )
         return
     cure = "set imu.k2 = true"

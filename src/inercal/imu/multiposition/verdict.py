@@ -120,16 +120,16 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
         yield Finding(
             "few_degrees_of_freedom",
             f"{len(poses.dwells)} poses leave {counted(dof, 'degree')} of freedom for {len(poses.accelerometer.fit.x)} "
-            f"parameters: the "
-            "uncertainties themselves are uncertain, record more poses",
+            "parameters, so that u itself is uncertain.",
+            action="Record more poses.",
         )
     if scatter.excess:
         yield Finding(
             "excess_scatter",
-            f"|f| scatters by {scatter.s:.2g} m/s^2 from pose to pose, {scatter.over_noise:.1f} times what the "
-            "noise at rest explains (the instrument was not quite still, or the model lacks a term); the "
-            "uncertainties use the scatter",
+            f"|f| scatters by {scatter.s:.2g} m/s^2 from pose to pose, {scatter.over_noise:.1f} times the noise at "
+            "rest, and u has that.",
             harm=(),
+            action="Hold the instrument stiller, or let the model have more terms, such as imu.k2.",
         )
 
 
@@ -148,9 +148,9 @@ def clipped_poses(poses: Poses, scatter: Scatter, recording: Recording) -> Itera
         words = ", ".join(map(str, sorted(set(short))))
         yield Finding(
             "saturation",
-            f"accelerometers sit at the end of their range in poses {words}, whose means are short: leave them out "
-            "(imu.exclude), or record once more with a wider range",
+            f"accelerometers sit at the end of their range in poses {words}, whose means are short",
             harm=EVERYTHING,
+            action="leave them out (imu.exclude), or record once more with a wider range",
         )
 
 
@@ -179,9 +179,9 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
             words = ", ".join(f"{axis} {d:+.3g}" for axis, d in zip("xyz", total, strict=True))
             yield Finding(
                 "bias_drift",
-                f"the gyro bias drifts over the recording by {words} {unit}; D_F is its mean, and the scatter of "
-                "the poses is in its uncertainty: set imu.bias_drift = true to estimate the drift",
+                f"the gyro bias drifts over the recording by {words} {unit}, and D_F is its mean",
                 harm=_of_axes(drifting),
+                action="set imu.bias_drift = true to estimate the drift",
             )
     f = poses.accelerometer.f
     if "G_xx" in drivers.names or len(f) < 8:
@@ -191,9 +191,9 @@ def gyro_findings(poses: Poses, drivers: Drivers, means: Array, recording: Recor
         size = float(np.max(np.linalg.norm(fitted[-3:], axis=0)) * np.mean(np.linalg.norm(f, axis=1)))
         yield Finding(
             "g_sensitivity",
-            f"the gyro output at rest changes with the pose by up to {size:.3g} {unit} per g: "
-            "set imu.g_sensitivity = true to estimate it",
+            f"the gyro output at rest changes with the pose by up to {size:.3g} {unit} per g",
             harm=_of_axes(leaning),
+            action="set imu.g_sensitivity = true to estimate it",
         )
 
 
@@ -214,7 +214,10 @@ def axis_findings(turns: Turns, verticals: Array, bias: Array) -> Iterator[Findi
     )
     code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
     yield Finding(
-        code, f"against the accelerometers {measured}: check the order and signs in the map", harm=EVERYTHING
+        code,
+        f"against the accelerometers {measured}",
+        harm=EVERYTHING,
+        action="check the order and signs in the map",
     )
 
 

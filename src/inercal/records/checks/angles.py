@@ -24,6 +24,7 @@ _ANGLE = re.compile(r"phi[123]|th_[xyz]|theta_ref")
 _TURN = 2.0 * np.pi
 _DEG = np.pi / 180.0
 _GIMBALS = ("th_x", "th_y", "th_z")
+_LOOK = "Look at the encoder and how it is read, and take these rows again or out."
 
 
 def angle_findings(columns: Mapping[str, Column]) -> list[Finding]:
@@ -102,12 +103,9 @@ def frozen(column: Column) -> list[Finding]:
             standstills.append(np.arange(start, end + 1))
     if not standstills:
         return []
-    text = (
-        f"{column.name}: stands still {counted(len(standstills), 'time')} amid steady motion, then catches up"
-    )
-    return [
-        Finding("stuck_encoder", text, places("row", rows[np.concatenate(standstills)] + 1), (column.name,))
-    ]
+    text = f"{column.name}: stands still {counted(len(standstills), 'time')} amid steady motion, then catches up."
+    where = places("row", rows[np.concatenate(standstills)] + 1)
+    return [Finding("stuck_encoder", text, where, (column.name,), action=_LOOK)]
 
 
 def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: bool) -> list[Finding]:
@@ -148,8 +146,8 @@ def stuck(rows: NDArray[np.int64], t: Array, th: Array, rate: Array, biased: boo
         return []
     at = np.concatenate([rows[turn[0] * size : (turn[-1] + 1) * size] for turn in turns_missed])
     who = "gyro" if biased else "command"
-    text = f"th: no angle moves while the platform turns according to the {who}"
-    return [Finding("stuck_encoder", text, places("row", at + 1), _GIMBALS)]
+    text = f"th: no angle moves while the platform turns according to the {who}."
+    return [Finding("stuck_encoder", text, places("row", at + 1), _GIMBALS, action=_LOOK)]
 
 
 def command_shift(t: Array, th: Array, command: Array) -> list[Finding]:
@@ -188,8 +186,10 @@ def command_shift(t: Array, th: Array, command: Array) -> list[Finding]:
     if abs(lag) < 2 or not match > 0.95 or not 1.0 - match < 0.5 * (1.0 - plain):
         return []
     how = "follow" if lag > 0 else "run ahead of"
-    text = f"th: the angles {how} the commanded rates by {abs(lag) * dt:.4g} s"
-    return [Finding("command_shift", text, harm=_GIMBALS)]
+    text = f"th: the angles {how} the commanded rates by {abs(lag) * dt:.4g} s."
+    return [
+        Finding("command_shift", text, harm=_GIMBALS, action="Shift the times of commands or angles by that.")
+    ]
 
 
 def _correlation(x: Array, y: Array, lag: int) -> float:

@@ -129,13 +129,15 @@ def time_unit(t: Array, subject: str = "t") -> list[Finding]:
     interval = float(np.median(np.diff(stamps)))
     if interval >= 2.0:
         looks = next(unit for unit, limit in (("ms", 500.0), ("us", 5e5), ("ns", np.inf)) if interval < limit)
-        text = f"{subject}: an interval of {interval:.4g} s looks like {looks} taken for s"
+        text = f"{subject}: an interval of {interval:.4g} s looks like {looks} taken for s."
     elif 0.0 < interval < 2e-5:
-        text = f"{subject}: an interval of {interval:.4g} s looks like s taken for a smaller unit"
+        text = f"{subject}: an interval of {interval:.4g} s looks like s taken for a smaller unit."
     else:
         return []
-    return [Finding("unit_suspect", text, harm=("t",))]
+    return [Finding("unit_suspect", text, harm=("t",), action=_CORRECT)]
 
+
+_CORRECT = "Correct the unit in the header or the map."
 
 _AROUND = 42
 _FEWEST = 10
@@ -147,8 +149,9 @@ def saturation(values: Array, name: str) -> list[Finding]:
     if rows.size == 0:
         return []
     at = " and ".join(f"{level:.6g}" for level in np.unique(values[rows]))
-    text = f"{name}: {counted(rows.size, 'sample')} in runs at {at}"
-    return [Finding("saturation", text, places("row", rows + 1), (name,))]
+    text = f"{name}: {counted(rows.size, 'sample')} in runs at {at}, an end of its range."
+    action = "Set a wider range of the sensor, or move it less."
+    return [Finding("saturation", text, places("row", rows + 1), (name,), action=action)]
 
 
 def saturated(values: Array) -> NDArray[np.int64]:
@@ -206,8 +209,9 @@ def outliers(values: Array, name: str) -> list[Finding]:
         rows = rows[~(same & (np.abs(own) < np.minimum(np.abs(before), np.abs(after))))]
     if rows.size == 0:
         return []
-    text = f"{name}: {counted(rows.size, 'sample')} far from both neighbours, knocks or wrong bits"
-    return [Finding("outlier", text, places("row", rows + 1), harm=())]
+    text = f"{name}: {counted(rows.size, 'sample')} far from both neighbours."
+    action = "Look for knocks and wrong bits there."
+    return [Finding("outlier", text, places("row", rows + 1), harm=(), action=action)]
 
 
 def outlying(values: Array) -> NDArray[np.int64]:
@@ -258,8 +262,8 @@ def accelerometer_unit(columns: Mapping[str, Column]) -> list[Finding]:
     ]
     if not fitting or given in fitting:
         return []
-    text = f"acc: a median norm of {norm:.4g} {given.symbol} looks like {fitting[0].symbol}"
-    return [Finding("unit_suspect", text, harm=("acc_x", "acc_y", "acc_z"))]
+    text = f"acc: a median norm of {norm:.4g} {given.symbol} looks like {fitting[0].symbol}."
+    return [Finding("unit_suspect", text, harm=("acc_x", "acc_y", "acc_z"), action=_CORRECT)]
 
 
 def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
@@ -270,8 +274,8 @@ def gyro_unit(columns: Mapping[str, Column]) -> list[Finding]:
             signal = numbers(columns[name].values)
             if 1000 * np.count_nonzero(np.abs(signal) > 100.0 / unit.factor) > signal.size:
                 looks = {"rad/s": "deg/s", "deg/s": "mdeg/s"}.get(unit.symbol, "a smaller unit")
-                text = f"{name}: rates up to {np.abs(signal).max():.6g} {unit.symbol} look like {looks}"
-                findings.append(Finding("unit_suspect", text, harm=(name,)))
+                text = f"{name}: rates up to {np.abs(signal).max():.6g} {unit.symbol} look like {looks}."
+                findings.append(Finding("unit_suspect", text, harm=(name,), action=_CORRECT))
     return findings
 
 
@@ -284,13 +288,8 @@ def temperature_unit(column: Column) -> list[Finding]:
     if 1000 * np.count_nonzero((signal < low) | (signal > high)) <= signal.size:
         return []
     span = f"{signal.min():.6g} to {signal.max():.6g} {column.unit.symbol}"
-    return [
-        Finding(
-            "unit_suspect",
-            f"{column.name}: {span} are hardly temperatures of an instrument",
-            harm=(column.name,),
-        )
-    ]
+    text = f"{column.name}: {span} are hardly temperatures of an instrument."
+    return [Finding("unit_suspect", text, harm=(column.name,), action=_CORRECT)]
 
 
 def dead_channel(values: Array, name: str) -> list[Finding]:
@@ -298,8 +297,10 @@ def dead_channel(values: Array, name: str) -> list[Finding]:
     if not is_dead(values):
         return []
     signal = numbers(values)
-    text = f"{name}: all {signal.size} samples are {signal[0]:.6g}, a dead or empty channel"
-    return [Finding("dead_channel", text, harm=(name,))]
+    text = f"{name}: all {signal.size} samples are {signal[0]:.6g}, a dead or empty channel."
+    return [
+        Finding("dead_channel", text, harm=(name,), action="Look at its wiring, or leave it out in the map.")
+    ]
 
 
 def is_dead(values: Array) -> bool:

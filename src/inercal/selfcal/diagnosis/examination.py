@@ -73,10 +73,9 @@ def _diagnosed(
         return findings
     # systematic inputs that are wrong within their uncertainty give all estimators large innovations
     if not result.converged or sound(filtered((recording, problem))):
-        text = (
-            f"the error-state filter finds no contradiction in this recording: the {result.kind} fails on it"
-        )
-        findings.append(Finding("filter_fails", text, harm=EVERYTHING))
+        text = f"The {result.kind} fails on this recording, in which the error-state filter finds no contradiction."
+        action = "Take the error-state filter, by --filter error-state."
+        findings.append(Finding("filter_fails", text, harm=EVERYTHING, action=action))
     return findings
 
 
@@ -135,7 +134,9 @@ def _beyond_prior(result: FilterResult, problem: FilterProblem) -> list[Finding]
         unit, size = shown_unit(UNIT_OF[name])
         value, u = rounded(values[i] / size, math.sqrt(variance[i]) / size)
         text = f"{name}: the recording says {value} +- {u} {unit}, its prior is {prior[i] / size:.3g}"
-        findings.append(Finding("prior_suspect", f"{text} {unit}: state a wider one", harm=(name,)))
+        findings.append(
+            Finding("prior_suspect", f"{text} {unit}", harm=(name,), action="state a wider one under [prior]")
+        )
     return findings
 
 

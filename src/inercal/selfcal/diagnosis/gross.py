@@ -96,7 +96,7 @@ def implausible(recording: Recording, settings: SelfcalSettings, where: object) 
     noise = LIMITS.noise_sigmas * settings.noise.encoder
     if moved.max() < noise:
         still = "the platform does not turn, expected turns: most coefficients stay as they were known before"
-        findings.append(Finding("at_prior", f"th: {still}"))
+        findings.append(Finding("at_prior", f"th: {still}", action="check that th are angles of this test"))
     else:
         _units(commanded, moved, noise, where)
         findings += _rig(motion, commanded, settings, "gyro" if recording.measured else "wc")
@@ -158,7 +158,11 @@ def _rig(motion: _Stretches, commanded: Array, settings: SelfcalSettings, sensor
         return [suspect]
     off = f"off by {100.0 * by_angles.misfit:.3g} % of the motion"
     text = f"th: the angles do not follow the rates {sensor}_x..z, {off}"
-    return [Finding("contradiction", text, harm=EVERYTHING)]
+    return [
+        Finding(
+            "contradiction", text, harm=EVERYTHING, action="check units, signs and order of both in the map"
+        )
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +197,7 @@ def _other_angles(motion: _Stretches, settings: SelfcalSettings) -> Iterator[Hyp
         def without(pair: _Pair, _: Array) -> _Pair:
             return replace(pair, seen=moved.turned(rig))
 
-        return Hypothesis(f"th: {text}", code, f"th: {text}", without, harm=EVERYTHING)
+        return Hypothesis(text, code, text, without, harm=EVERYTHING)
 
     def changes(other: Gimbals) -> int:
         return sum(a != b for a, b in zip((*other.axes, *other.signs), now, strict=True))
@@ -207,12 +211,15 @@ def _other_angles(motion: _Stretches, settings: SelfcalSettings) -> Iterator[Hyp
         code = "sign_suspect" if other.axes == of_study.axes else "channel_swap"
         text = f"the angles follow the rates with gimbals = {list(other.axes)}, signs = {list(other.signs)}"
         rig = world._replace(axes=other.index, signs=other.sign)
-        yield hypothesis(code, f"{text} of the rig, not with those of the study", motion, rig)
+        yield hypothesis(
+            code, f"{text}, not with those of the study: correct gimbals under [rig]", motion, rig
+        )
     for order in itertools.permutations(range(3)):
         pairs = ((axis, "xyz"[order.index(k)]) for k, axis in enumerate("xyz"))
         names = ", ".join(f"th_{axis} looks like th_{other}" for axis, other in pairs if axis != other)
         moved = replace(motion, th=motion.th[:, order])
-        yield hypothesis("channel_swap", f"{names}, as the rates have it", moved, world)
+        what = f"{names}, as the rates have it"
+        yield hypothesis("channel_swap", f"{what}: exchange their columns in the map", moved, world)
 
 
 def _other_axes(sensor: str) -> Iterator[Hypothesis[_Pair]]:
@@ -228,7 +235,7 @@ def _other_axes(sensor: str) -> Iterator[Hypothesis[_Pair]]:
             if "xyz"[k] != axis or sign < 0.0
         )
         code = "sign_suspect" if order == (0, 1, 2) else "channel_swap"
-        text = f"{sensor}: {words}, as the angles have it"
+        text = f"{words}, as the angles have it: correct their columns or signs in the map"
         yield Hypothesis(text, code, text, partial(_reordered, order, signs), harm=EVERYTHING)
 
 
@@ -259,7 +266,9 @@ def _accelerometers(
         ):
             return []
         text = f"acc: a median norm of {norm:.4g} m/s^2 is not gravity, {g0:.5g} m/s^2"
-        return [Finding("unit_suspect", text, harm=EVERYTHING)]
+        return [
+            Finding("unit_suspect", text, harm=EVERYTHING, action="correct the unit in the header or the map")
+        ]
     force = np.empty_like(acc)
     for first in range(0, len(acc), _CHUNK):
         some = slice(first, first + _CHUNK)
@@ -271,7 +280,9 @@ def _accelerometers(
     if suspect is not None:
         return [suspect]
     text = f"acc: specific force does not follow the angles, off by {100.0 * pair.misfit:.3g} % of gravity"
-    return [Finding("contradiction", text, harm=EVERYTHING)]
+    return [
+        Finding("contradiction", text, harm=EVERYTHING, action="check signs and order of both in the map")
+    ]
 
 
 def clipped(recording: Recording, settings: SelfcalSettings, channel: str) -> bool:
@@ -328,7 +339,8 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
             right[:, order[i]] = signs[i] * recording.acc[:, i]
         return replace(recording, acc=right), problem
 
-    code, text = "sign_suspect" if order == sensors else "channel_swap", ", ".join(words)
+    code = "sign_suspect" if order == sensors else "channel_swap"
+    text = f"{', '.join(words)}: correct their columns or signs in the map"
     yield Hypothesis(text, code, text, without, alternatives=len(ways) - 1, harm=EVERYTHING)
 
 
@@ -357,7 +369,7 @@ def off_the_path(
     if away.max() > LIMITS.off_the_path:
         first, joint = divmod(int(np.argmax(away > LIMITS.off_the_path)), 3)
         text = (
-            f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s; the angles are up to "
+            f"{JOINTS[joint]} leaves the study's path at {t[first]:.6g} s, and the angles are up to "
             f"{math.degrees(away.max()):.3g} deg away from it"
         )
         # the recorded angles count in the fit, not those of the plan

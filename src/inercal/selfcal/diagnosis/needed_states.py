@@ -69,14 +69,15 @@ def needed_states(case: Case) -> Explained | None:
             if factor > 1.0 and not known:
                 advice += f", with {larger}"
             if white > max(LIMITS.nearly_white, best.white if best else 0.0):
-                text = f"{words} explain the innovations: {advice}"
-                best = Explained(Finding("unmodelled", text, harm=EVERYTHING), white)
+                text = f"{words} explain the innovations"
+                best = Explained(Finding("unmodelled", text, harm=EVERYTHING, action=advice), white)
             if white > LIMITS.risk:
                 return best
             left = _off(recording, now)
             if walks and left < much:
-                text = f"most of the innovations look like {words}, as with 1/f noise: {advice}"
-                most, much = Explained(Finding("unmodelled", text, harm=EVERYTHING), white), 0.5 * left
+                text = f"most of the innovations look like {words}, as with 1/f noise"
+                found = Finding("unmodelled", text, harm=EVERYTHING, action=advice)
+                most, much = Explained(found, white), 0.5 * left
             if left > before:
                 break
             before = left

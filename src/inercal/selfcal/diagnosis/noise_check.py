@@ -10,7 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.consistency import slow_power, whiteness
 from inercal.estimate.hypotheses import sigmas
-from inercal.findings import EVERYTHING, Finding
+from inercal.findings import EVERYTHING, Finding, with_alternatives
 from inercal.records.places import places
 from inercal.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
 from inercal.selfcal.diagnosis.needed_states import Explained, needed_states
@@ -18,6 +18,8 @@ from inercal.selfcal.filters.filter_result import FilterResult
 from inercal.selfcal.limits import LIMITS
 
 _SENSORS = ("accelerometers", "encoders")
+
+_NOISE = "state the noise as it is under [noise]"
 
 
 def misstated(case: Case, now: FilterResult) -> list[Finding]:
@@ -37,10 +39,10 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
             wide = True
             if _even(columns, mean) and whiteness(columns) > LIMITS.risk:
                 text = f"{sensor}: noise is {factor:.3g} times what is stated, evenly over the recording"
-                findings.append(Finding("excess_scatter", text, harm=EVERYTHING))
+                findings.append(Finding("excess_scatter", text, harm=EVERYTHING, action=_NOISE))
         elif mean < 1.0 - LIMITS.nis_sigmas * error and factor * LIMITS.low_noise_ratio < 1.0:
-            text = f"{sensor}: noise is only {factor:.2g} of what is stated; the uncertainties are too large"
-            findings.append(Finding("low_scatter", text))
+            text = f"{sensor}: noise is only {factor:.2g} of what is stated, and u is too large"
+            findings.append(Finding("low_scatter", text, action=_NOISE))
     if findings:
         return findings
     if not wide and case[1].noise.unsteady:
@@ -60,9 +62,9 @@ def unsteady(case: Case, any_states: bool = True) -> Finding | None:
     if not found:
         return None
     best, *others = sorted(found, key=lambda each: -each.white)
-    also = "; ".join(each.finding.message.split(":")[0] for each in others if each.white > LIMITS.risk)
-    message = best.finding.message + (f"; equally possible: {also}" if also else "")
-    return replace(best.finding, message=message)
+    return with_alternatives(
+        best.finding, (each.finding.headline for each in others if each.white > LIMITS.risk)
+    )
 
 
 def _wandering(case: Case, z: Array) -> list[Finding]:
@@ -71,8 +73,9 @@ def _wandering(case: Case, z: Array) -> list[Finding]:
     rows = LIMITS.slow_time / float(np.median(recording.dt))
     if problem.states.has("accelerometer_walk") or slow_power(z[:, :3], rows) > LIMITS.risk:
         return []
-    text = "innovations of the accelerometers are correlated over seconds, as where their biases wander: name"
-    return [Finding("unmodelled", f"{text} bias_walk in states under [model]", harm=EVERYTHING)]
+    text = "innovations of the accelerometers are correlated over seconds, as where their biases wander"
+    action = "name bias_walk in states under [model]"
+    return [Finding("unmodelled", text, harm=EVERYTHING, action=action)]
 
 
 def _swaying(case: Case, z: Array) -> Finding | None:
@@ -96,8 +99,9 @@ def _swaying(case: Case, z: Array) -> Finding | None:
     if not sound(filtered((recording, replace(problem, noise=stated)))):
         return None
     hertz, seconds = (largest + 1) / (n * dt), math.degrees(amplitude) * 3600.0
-    text = f"the encoders' readings swing with {hertz:.2g} Hz, by some {seconds:.2g} arcsec: where the base sways, "
-    return Finding("excess_scatter", text + "state base_sway under [noise]", harm=EVERYTHING)
+    text = f"the encoders' readings swing with {hertz:.2g} Hz, by some {seconds:.2g} arcsec"
+    action = "where the base sways, state base_sway under [noise]"
+    return Finding("excess_scatter", text, harm=EVERYTHING, action=action)
 
 
 def _even(columns: Array, mean: float) -> bool:
@@ -128,7 +132,8 @@ def _restless_gyros(case: Case) -> Explained | None:
             more = f" ({_two_digits(low)} to {_two_digits(high)})" if len(fitting) > 1 else ""
             larger = octaves[0] > 0.0
             code, harm = ("excess_scatter", EVERYTHING) if larger else ("low_scatter", ())
-            return Explained(Finding(code, text + more, harm=harm), max(fitting.values()))
+            found = Finding(code, text + more, harm=harm, action="state angle_random_walk so under [noise]")
+            return Explained(found, max(fitting.values()))
     return None
 
 

@@ -161,15 +161,23 @@ def _stated_with(names: Sequence[str]) -> Callable[[Case, Array], Case]:
     return without
 
 
-def _shown(names: Sequence[str], unit: str, fit: Fitted[Case]) -> str:
-    """Values of those parameters that are large, in words."""
+def _largest(names: Sequence[str], unit: str, fit: Fitted[Case]) -> str:
+    """The parameter that is clearest, in words; all of them where none is clear by itself."""
     shown, size = shown_unit(unit)
-    seen = [
-        f"{name} = {value / size:.3g} +- {u / size:.1g} {shown}"
-        for name, value, u in zip(names, fit.values, fit.u, strict=True)
-        if abs(value) > LIMITS.shown_sigmas * u
-    ]
-    return ", ".join(seen or [f"{', '.join(names)} together"])
+    over = np.abs(fit.values) / fit.u
+    worst = int(np.argmax(over))
+    if not over[worst] > LIMITS.shown_sigmas:
+        return f"all {len(names)} together"
+    return f"{names[worst]} by {fit.values[worst] / size:.3g} +- {fit.u[worst] / size:.1g} {shown}"
+
+
+def _items(names: Sequence[str], unit: str, fit: Fitted[Case]) -> tuple[Mapping[str, str | float], ...]:
+    """The parameters with their values, as rows of a table."""
+    shown, size = shown_unit(unit)
+    return tuple(
+        {"error": name, "value": value / size, "u": u / size, "unit": shown}
+        for name, value, u in zip(names, fit.values.tolist(), fit.u.tolist(), strict=True)
+    )
 
 
 def _kind(kind: str, names: tuple[str, ...], columns: Columns) -> Hypothesis[Case]:
@@ -178,10 +186,16 @@ def _kind(kind: str, names: tuple[str, ...], columns: Columns) -> Hypothesis[Cas
     remedy = advice or f"name {'temperature' if kind in TEMPERATURE else kind} in states under [model]"
 
     def says(fit: Fitted[Case]) -> str:
-        return f"{what}, which the model leaves out: {_shown(names, UNIT_OF[names[0]], fit)}; {remedy}"
+        return f"{what}, which the model leaves out ({_largest(names, UNIT_OF[names[0]], fit)}): {remedy}"
 
     return Hypothesis(
-        kind, "unmodelled", says, _stated_with(names), names, derivative=lambda case: columns(case, names)
+        kind,
+        "unmodelled",
+        says,
+        _stated_with(names),
+        names,
+        derivative=lambda case: columns(case, names),
+        items=lambda fit: _items(names, UNIT_OF[names[0]], fit),
     )
 
 
@@ -222,10 +236,18 @@ def _asymmetry(about: Judged) -> Hypothesis[Case]:
         return _columns_by(about, case, courses)
 
     def says(fit: Fitted[Case]) -> str:
-        shown = _shown(names, "1", fit)
-        return f"the scale of the accelerometers is not the same both ways: {shown}; take it out of their readings"
+        what = f"the scale of the accelerometers is not the same both ways ({_largest(names, '1', fit)})"
+        return f"{what}: take it out of their readings"
 
-    return Hypothesis("asymmetry", "unmodelled", says, without, names, derivative=kept(derivative))
+    return Hypothesis(
+        "asymmetry",
+        "unmodelled",
+        says,
+        without,
+        names,
+        derivative=kept(derivative),
+        items=lambda fit: _items(names, "1", fit),
+    )
 
 
 def _wander(of: str, columns: Callable[[Case], Array], mine: slice) -> Hypothesis[Case]:

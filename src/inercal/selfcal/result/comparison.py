@@ -91,6 +91,7 @@ def differing(filtered: FilterResult, others: Mapping[FilterKind, FilterResult])
     worst = int(np.argmax(apart))
     text = (
         f"map, which linearises all rows where it ends, is up to {apart[worst]:.2g} u from {filtered.kind} "
-        f"({filtered.names[worst]}): take its values, by --filter map"
+        f"({filtered.names[worst]})"
     )
-    return [Finding("estimators_differ", text, harm=tuple(filtered.names[k] for k in far))]
+    harm = tuple(filtered.names[k] for k in far)
+    return [Finding("estimators_differ", text, harm=harm, action="take its values, by --filter map")]

@@ -9,7 +9,7 @@ taken at its word, and a finding says what that leaves out.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -152,7 +152,7 @@ def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> No
     shift = slope @ found.shift
     source = TypeB(SOURCE, 1.0, "1", shift @ axes * np.sqrt(np.maximum(eigenvalues, 0.0)))
     left = np.sqrt(np.diag(moment))
-    raised, told = np.zeros(len(u), dtype=bool), list[str]()
+    raised, told = np.zeros(len(u), dtype=bool), list[dict[str, str | float]]()
     for kind in kinds:
         own = np.array([each == kind for each in found.kinds])
         more = np.sqrt(
@@ -160,7 +160,7 @@ def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> No
         )
         if (more > LIMITS.considered_part * u).any():
             raised |= more > LIMITS.considered_part * u
-            told.append(_words(kind, found, own, left))
+            told.append(_item(kind, found, own, left))
     these = [name for name, by in zip(names, raised.tolist(), strict=True) if by]
     walks = ("bias_walk",) if {*BIAS_WALK} & {*kinds} else ()
     return NotFitted((*kinds, *walks), source, _told(told, these) if these else None)
@@ -210,20 +210,22 @@ def _of_names(
     return _Effects(tuple(kinds), tuple(names), usual, innovations[there] * usual, shift * usual)
 
 
-def _words(kind: str, found: Evidence, own: Array, left: Array) -> str:
-    """The largest error that is left of a kind, in words."""
+def _item(kind: str, found: Evidence, own: Array, left: Array) -> dict[str, str | float]:
+    """The largest error that is left of a kind, as a row of a table."""
     worst = int(np.flatnonzero(own)[np.argmax(left[own])])
     name = found.names[worst]
     if kind in BIAS_WALK:
-        return f"{left[worst]:.2g} times {kind}"
+        return {"error": kind, "left": left[worst], "usual": 1.0, "unit": "of what is stated"}
     unit, size = shown_unit(UNIT_OF[name])
-    return f"{left[worst] * found.usual[worst] / size:.2g} {unit} of {name} ({found.usual[worst] / size:.3g} usual)"
+    usual = float(found.usual[worst]) / size
+    return {"error": name, "left": float(left[worst]) * usual, "usual": usual, "unit": unit}
 
 
-def _told(left: Sequence[str], names: Sequence[str]) -> Finding:
+def _told(items: Sequence[Mapping[str, str | float]], names: Sequence[str]) -> Finding:
     """The finding that tells what errors which are not fitted do to u."""
     return Finding(
         "considered",
-        f"errors of the rig that are no states count in u of {counted_names(names, 6)}, as large as usual or as this "
-        f"recording leaves them: up to {', '.join(left)}; name them in states under [model], or state them there",
+        f"Errors of the rig that are no states count in u of {counted_names(names, 2)}.",
+        action="Name them in states under [model], or state them there.",
+        items=tuple(items),
     )

@@ -90,7 +90,8 @@ def assemble(
     if filtered.kind == "gimbal-ukf" and filtered.gimbal_cosine < LIMITS.singular_cosine:
         angle = math.degrees(math.acos(filtered.gimbal_cosine))
         text = f"the inner gimbal comes to {angle:.2f} deg, where the gimbal-angle model does not hold"
-        all_findings.append(Finding("gimbal_lock", text, harm=EVERYTHING))
+        action = "take the error-state filter, by --filter error-state"
+        all_findings.append(Finding("gimbal_lock", text, harm=EVERYTHING, action=action))
     interval, own = float(np.median(recording.dt)), FACTOR_OF.get(filtered.kind)
     result: dict[str, Any] = {
         "filter": filtered.kind,

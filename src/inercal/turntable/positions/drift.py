@@ -102,10 +102,11 @@ def _linear(means: Readings, fit: Fit, unit: str) -> Drift:
         at, at_u = np.where(used, mean, at), np.where(used, mean_u, at_u)
         for k in np.flatnonzero(~used):
             text = (
-                f"{means.channels[k]} drifts within the dwells otherwise than from dwell to dwell ({apart[k]:.1f} "
-                "standard uncertainties apart), as where it settles after each move: wait longer before each reading"
+                f"{means.channels[k]} drifts within the dwells otherwise than from dwell to dwell ({apart[k]:.1f} u "
+                "apart), as if it settles after moves"
             )
-            findings.append(Finding("trend", text, "", (means.channels[k],)))
+            action = "wait longer before each reading"
+            findings.append(Finding("trend", text, "", (means.channels[k],), action=action))
     if used.any():
         known = Effects(columns[..., ~used], columns[..., used] * at_u[used])
         offset = columns[..., used] @ at[used]

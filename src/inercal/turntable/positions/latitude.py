@@ -60,9 +60,9 @@ def of_latitude(
     if harm:
         text = (
             f"the latitude is so uncertain ({np.degrees(site.latitude_u):.2g} deg) that u of {', '.join(harm)} "
-            "cannot be had from it: state it better"
+            "cannot be had from it"
         )
-        return [], [Finding("uncertain_site", text, "", harm)]
+        return [], [Finding("uncertain_site", text, "", harm, action="state it better")]
     if part.max() < LIMITS.straight_part:
         return [], []
     more = np.sign(first) * np.sqrt(np.maximum(6.0 * first * third, 0.0))

@@ -227,10 +227,10 @@ def expected_model(settings: TurntableSettings) -> tuple[TableModel, Array, list
         )
     if settings.design.table_errors and not settings.instrument.coefficients:
         text = (
-            "no coefficients are expected of the instrument: what the table's errors do to its readings cannot be "
-            "foreseen; state them under [instrument.coefficients]"
+            "what the table's errors do to readings cannot be foreseen without coefficients of the instrument"
         )
-        findings.append(Finding("no_coefficients", text))
+        action = "state those expected under [instrument.coefficients]"
+        findings.append(Finding("no_coefficients", text, action=action))
     return model, expected_coefficients(settings, model), findings
 
 

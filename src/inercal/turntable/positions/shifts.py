@@ -10,6 +10,7 @@ import numpy as np
 from inercal.arrays import Array
 from inercal.estimate.budget import TypeB
 from inercal.findings import Finding
+from inercal.records.places import counted
 from inercal.turntable.limits import LIMITS
 from inercal.turntable.positions.examination import Examination, Seen, Tested
 from inercal.turntable.regression import Regression
@@ -60,25 +61,27 @@ def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: U
         harm = tuple(name for name, by in zip(scale.names, most, strict=True) if by > LIMITS.harmful_shift)
         text = (
             f"{each.fault.what} of {each.fault.size(each.values, shown)} (by chance with a probability of "
-            f"{each.chance:.1g}): it shifts {_largest(scale.names, shift)}; {_REMEDY[each.fault.code]}"
+            f"{each.chance:.1g}) shifts {_largest(scale.names, shift)}"
         )
-        yield Finding(each.fault.code, text, "", harm)
+        yield Finding(each.fault.code, text, "", harm, action=_REMEDY[each.fault.code])
     worst: dict[str, Blind] = {}
     for seen in examination.asked:
         blind, kind = _blind(seen, fit, scale, shown), seen.fault.kind
-        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift, "")).shift:
+        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift)).shift:
             worst[kind] = blind
     if worst:
-        yield Finding("weak_test", _weak(worst.values()))
+        yield _weak(worst.values())
 
 
 @dataclass(frozen=True)
 class Blind:
     """A fault that the residuals may miss: the largest ``shift`` of a value, over u, by one that is named in half of
-    the tests, infinite where none is, and in ``words`` its size that shifts this value by 2 u."""
+    the tests, infinite where none is; ``what`` it is, its ``size`` that shifts this ``value`` by 2 u."""
 
     shift: float
-    words: str
+    what: str = ""
+    size: str = ""
+    value: str = ""
 
 
 def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> Blind:
@@ -90,24 +93,27 @@ def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) 
         worst = int(np.argmax(size))
         if size[worst] > _ROUNDING * np.linalg.norm(effect):
             values = base @ shift[worst] * 2.0 / size[worst] ** 2
-            words = f"{seen.fault.what} of {seen.fault.size(values, shown)} ({scale.names[worst]})"
-            return Blind(reach * float(size[worst]), words)
-    return Blind(0.0, "")
+            told = seen.fault.size(values, shown)
+            return Blind(reach * float(size[worst]), seen.fault.what, told, scale.names[worst])
+    return Blind(0.0)
 
 
-def _weak(blind: Collection[Blind]) -> str:
-    """Sentence on faults that would shift a value by 2 u, and hardly show, or not at all."""
-    hardly = "; ".join(each.words for each in blind if np.isfinite(each.shift))
-    never = "; ".join(each.words for each in blind if not np.isfinite(each.shift))
-    texts = []
-    if hardly:
-        texts.append(
-            f"the residuals might not show what shifts a value by 2 u: {hardly}: more positions, another order of "
-            "them, or some once more at the end might show it"
-        )
-    if never:
-        texts.append(f"no residual shows what shifts a value by 2 u: {never}")
-    return "; ".join(texts)
+def _weak(blind: Collection[Blind]) -> Finding:
+    """``weak_test``: faults that would shift a value by 2 u, and hardly show, or not at all."""
+    return Finding(
+        "weak_test",
+        f"This test cannot rule out {counted(len(blind), 'fault')} that would shift a value by 2 u.",
+        action="Shuffle the positions, take more of them, or repeat the first ones at the end.",
+        items=tuple(
+            {
+                "fault": each.what.rstrip(","),
+                "size that shifts the value by 2 u": each.size,
+                "value": each.value,
+                "residuals": "might not show it" if np.isfinite(each.shift) else "cannot show it",
+            }
+            for each in blind
+        ),
+    )
 
 
 def _hidden(tested: Tested, fit: Regression, scale: Scale) -> Array:

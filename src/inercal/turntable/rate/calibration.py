@@ -114,8 +114,8 @@ def calibrate_rates(record: Record, settings: TurntableSettings) -> RateCalibrat
     if identified.rank < len(identified.names):
         asymmetry = False
         identified = separable(readings.rate, axis, test.order, asymmetry)
-        text = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
-        findings.append(Finding("weak_term", text))
+        text = "the rates do not tell the asymmetry from the other terms"
+        findings.append(Finding("weak_term", text, action="take two or more of either sign"))
     stays, terms = len(readings.rate), len(identified.names)
     if identified.rank < terms:
         words = [in_words(vector / identified.scale, identified.names) for vector in identified.null_vectors]
@@ -197,8 +197,8 @@ def _several_axes(
     if identified.rank < len(identified.names):
         asymmetry = False
         identified = _weakest(readings, own, taken, test.order, asymmetry)
-        text = "the rates do not tell the asymmetry from the other terms: take two or more of either sign"
-        findings.append(Finding("weak_term", text))
+        text = "the rates do not tell the asymmetry from the other terms"
+        findings.append(Finding("weak_term", text, action="take two or more of either sign"))
     if identified.rank < len(identified.names):
         words = [in_words(vector / identified.scale, identified.names) for vector in identified.null_vectors]
         text = f"the rates about one axis do not change along {'; '.join(words)} (by rad/s); add rates"

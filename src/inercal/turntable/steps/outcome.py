@@ -201,10 +201,10 @@ def _findings(response: Response, u: dict[str, float], t: Array) -> list[Finding
         if 2.0 * stdtr(dof if np.isfinite(response.noise_dof) else 1e9, -score) < LIMITS.residual_risk:
             text = (
                 f"the bias of {channel} drifts, and not steadily: by up to "
-                f"{abs(0.25 * bend / response.values[1]) / _UG_SIZE:.2g} {_UG} off a straight line; let it settle, or "
-                "take the steps faster"
+                f"{abs(0.25 * bend / response.values[1]) / _UG_SIZE:.2g} {_UG} off a straight line"
             )
-            found.append(Finding("trend", text, harm=response.names))
+            action = "let it settle, or take the steps faster"
+            found.append(Finding("trend", text, harm=response.names, action=action))
     return found
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from nicegui import ui
 from starlette.requests import Request
 
+from inercal.findings import Finding
 from inercal.workbench.bench import said_of
 from inercal.workbench.jobs import Job
 from inercal.workbench.sessions import Session
@@ -138,6 +139,19 @@ def heading(words: str) -> None:
     """The head of a part of a page."""
     with ui.element("h2"):
         ui.label(words)
+
+
+def said(finding: Finding) -> None:
+    """A finding: what it is, what to do about it, and the table of its items."""
+    where = f" ({finding.where})" if finding.where else ""
+    ui.label(f"{finding.code}: {finding.headline}{where}").classes("doubt")
+    if finding.action:
+        ui.label(f"→ {finding.action[:1].upper()}{finding.action[1:]}").classes("ml-4").props(
+            'data-action="1"'
+        )
+    heads, rows = finding.table
+    if rows:
+        table(heads, rows)
 
 
 def table(

@@ -25,6 +25,7 @@ from inercal.workbench.pages.frame import (
     heading,
     picture,
     refused,
+    said,
     table,
     told,
 )
@@ -141,8 +142,7 @@ def _one(looked: Looked, rests: Sequence[tuple[float, float]], span: tuple[float
         "Nothing suspicious was found." if not findings else f"{counted(len(findings), 'finding')}:"
     ).props('data-findings="1"')
     for finding in findings[:20]:
-        where = f" ({finding.where})" if finding.where else ""
-        ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+        said(finding)
     _pictures(looked, replace(looked.notes, rests=rests) if rests else looked.notes, span)
     _channels(looked)
 

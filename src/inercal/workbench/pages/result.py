@@ -28,6 +28,7 @@ from inercal.workbench.pages.frame import (
     picture,
     refused,
     report,
+    said,
     table,
     told,
 )
@@ -94,8 +95,7 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
     shown = result.status is not Status.OK or any(advised.values())
     with ui.expansion(counted(len(result.findings), "finding"), value=shown).classes("w-full"):
         for finding, advice in advised.items():
-            where = f" ({finding.where})" if finding.where else ""
-            ui.label(f"{finding.code}: {finding.message}{where}").classes("doubt")
+            said(finding)
             for each in advice:
                 button(f"Set {each.words}", partial(_take, bench, session, each))
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from inercal.arrays import Array
 from inercal.estimate.hypotheses import search
+from inercal.findings import Finding
 from inercal.imu.aided.diagnosis.fit_quality import mean_bias, variation, whitening
 from inercal.imu.aided.diagnosis.small import constant_errors
 from inercal.imu.aided.fit import Fit, noise_of
@@ -24,14 +25,13 @@ from inercal.imu.limits import LIMITS
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """A fault that is in the data: the ``code`` and ``message`` of its finding.
+    """A fault that is in the data, as the ``finding`` says it.
 
     ``shift`` (p,) of the coefficients if it is fitted with them; ``part`` the rms of what it does to the outputs over
     the variation of these.
     """
 
-    code: str
-    message: str
+    finding: Finding
     shift: Array
     part: float
 
@@ -62,7 +62,7 @@ def misfits(fit: Fit, names: tuple[str, ...], rows: Array, motion: Motion, gravi
         part, change = _part(fit, patterns), judge.change(patterns)
         if part >= LIMITS.faint_share and _explains(fit, without, change):
             shift = rows @ change - _biases(fit, names, patterns)
-            named.append(Misfit(each.hypothesis.code, each.sentence, shift, part))
+            named.append(Misfit(each.finding, shift, part))
     return named
 
 
