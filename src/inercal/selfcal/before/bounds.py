@@ -314,7 +314,8 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                     sigma = noise.encoder
                     floor = apart(noise, F.dt, sigma)
                     roots, _ = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
-                    encoders(th[k], read, base, c, layout, world, own)
+                    if len(layout.columns) > 0:
+                        encoders(th[k], read, base, c, layout, world, own)
                     for i in range(3):
                         size = decorrelated_row(i, roots[i], layout.columns, own.axes, row)
                         _observe(P, row, size, 1.0, _PARTS[1], work)

@@ -187,7 +187,8 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
                 sigma = noise.encoder
                 floor = apart(noise, F.dt, sigma)
                 roots, variances = encoder_roots(th[k], world.axes, world.signs, sigma, noise.joints, floor)
-                encoders(th[k], read, base, c, layout, world, own)
+                if len(layout.columns) > 0:
+                    encoders(th[k], read, base, c, layout, world, own)
                 for i in range(3 if len(slopes) > 0 else 0):
                     size = encoder_row(i, layout.columns, own.axes, row)
                     _shown(P, S, row, size, variances[i], slopes[k, 3 + i])

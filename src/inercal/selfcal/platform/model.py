@@ -253,7 +253,8 @@ def encoders(
     """Attitude (4,) of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc; its columns,
     of the places ``layout.columns``, in ``own.axes``.
 
-    Turns of p by sag, and within a delay, of some 1e-4, are left out of the axes of what is before them.
+    Turns of p by sag, of some 1e-5, are left out of the axes of what is before it; what rates change within a delay is
+    left out, too.
     """
     joints, axes, terms, first = own.small[2:], own.axes, layout.terms, layout.until[2]
     joint_angles(th, c, layout, own)
@@ -275,11 +276,16 @@ def encoders(
         of_earth = specific_force(q, base.earth)
         over = (rate[0] - of_earth[0], rate[1] - of_earth[1], rate[2] - of_earth[2])
         by = about_turning(over, th, layout.turning, world.axes, world.signs)
+        within = rate if layout.turning.all() else by
+        back = exp((-tau * within[0], -tau * within[1], -tau * within[2]))
+        for a in range(len(layout.columns)):
+            at_row = rotate(back, (axes[a, 0], axes[a, 1], axes[a, 2]))
+            axes[a, 0], axes[a, 1], axes[a, 2] = at_row
         if layout.late[0] >= 0:
             axes[layout.late[0], 0], axes[layout.late[0], 1], axes[layout.late[0], 2] = by
         if layout.turning.all():
             return propagate(q, rate, base.earth, tau)
-        q = multiply(q, exp((tau * by[0], tau * by[1], tau * by[2])))
+        q = multiply(q, (back[0], -back[1], -back[2], -back[3]))
     return q
 
 
