@@ -48,7 +48,7 @@ _SCHEME = r"(?:[A-Za-z][A-Za-z0-9+.-]*:/{2,}|[A-Za-z][A-Za-z0-9+.-]+:/)"
 _IN_TEXT = re.compile(rf"(?:^|(?<=[\s\"'(\[{{<>`])|(?<=::)|(?<=[\w\]]=)){_SCHEME}")
 _WHOLE = re.compile(rf"(?:^(?:[\w.-]+=)?|(?<=::)){_SCHEME}")
 _WORD = re.compile(r"[^\s\"'<>]*")
-_PORT = re.compile(r"(?:\[[^\]]*\]|[^:]*)(?::(?:\d{0,5}|PORT|\*\*\*))?[.,:;)\]}]*")
+_PORT = re.compile(r"(?:\[[^\]]*\]|[^:]*)(?::(?:\d{0,5}|PORT|\*\*\*))?[.,:;)\]}\s]*")
 _ASSIGNED = re.compile(
     r"(?i)(?<![\w-])([\w-]*(?:(pass(?:word|wd|phrase)|pwd)|secret|token|access_?key|api_?key|sessionid)\s*=\s*)"
     r"(\"[^\"]*\"|'[^']*'|[^\s=\"'][^\s\"']*)"

@@ -33,8 +33,10 @@ def named(made, problem=PROBLEM):
 def only(found, code, *words):
     """The one finding, of that code and with these words."""
     assert [finding.code for finding in found] == [code]
+    items = (f"{row['error']} = {float(row['value']):.2g}" for row in found[0].items if "error" in row)
+    told = f"{found[0].message}; {', '.join(items)}"
     for word in words:
-        assert word in found[0].message
+        assert word in told
     # but for what is left out without harm, and noise that is too small, any value may be off
     assert found[0].harm == (() if CODES[code].harm is Harm.NEVER else EVERYTHING)
     return found[0]

@@ -281,14 +281,14 @@ def test_axes_exchanged_or_reversed(record, code, words):
 def test_gimbals_of_another_order_than_the_study_says(axes):
     found = recording_of(RECORD, replace(STUDY, gimbals=Gimbals(axes)))
     assert codes(found) == ["channel_swap"]
-    assert "gimbals = ['z', 'x', 'y'], signs = [1, 1, 1] of the rig" in said(found)
+    assert "gimbals = ['z', 'x', 'y'], signs = [1, 1, 1], not with those of the study" in said(found)
 
 
 @pytest.mark.parametrize("signs", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, -1)])
 def test_signs_other_than_the_study_says(signs):
     found = recording_of(RECORD, replace(STUDY, gimbals=Gimbals(signs=signs)))
     assert codes(found) == ["sign_suspect"]
-    assert "signs = [1, 1, 1] of the rig" in said(found)
+    assert "signs = [1, 1, 1], not with those of the study" in said(found)
 
 
 def test_rates_that_have_nothing_to_do_with_the_angles():

@@ -46,8 +46,8 @@ def test_columns_of_innovations_are_differences(settings, tmp_path):
             size = 1e-3 / np.nanmax(np.abs(exact[..., k]))
             by_runs = slopes(case, replace(each, derivative=None, step=size), z, JUDGE)[..., k]
             off = np.nanmax(np.abs(exact[..., k] - by_runs)) / np.nanmax(np.abs(exact[..., k]))
-            # of late encoders the two sides differ where a turn begins
-            assert off < (0.2 if each.name == "tau_enc" else 0.002), each.parameters[k]
+            # of late encoders the two sides differ where a turn begins; columns leave out what arms do to other columns
+            assert off < (0.2 if each.name == "tau_enc" else 0.003), each.parameters[k]
 
 
 NAMED = {

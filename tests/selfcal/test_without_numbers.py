@@ -12,7 +12,7 @@ from inercal.estimate.budget import combine
 from inercal.findings import Status
 from inercal.geometry.site import GravityInput
 from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.observability import singular
+from inercal.selfcal.before.observability import not_positive
 from inercal.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.selfcal.diagnosis.examination import diagnose
 from inercal.selfcal.filters.problem import problem
@@ -60,8 +60,8 @@ def test_whether_a_covariance_is_one_does_not_depend_on_units(powers):
     """C is positive definite if and only if D C D is, for any diagonal D."""
     unit = 10.0 ** np.array(powers)
     sound, none = np.array([[1.0, 0.9, 0.1], [0.9, 1.0, 0.2], [0.1, 0.2, 1.0]]), np.ones((3, 3)) - np.eye(3)
-    assert singular(unit, sound * np.outer(unit, unit)) is None
-    status, said = singular(unit, none * np.outer(unit, unit))
+    assert not_positive(unit, sound * np.outer(unit, unit)) is None
+    status, said = not_positive(unit, none * np.outer(unit, unit))
     assert status is Status.ILL_CONDITIONED
     assert "check their units" in said
 

@@ -21,7 +21,6 @@ from inercal.arrays import Array
 from inercal.geometry.rotations import conjugate, exp, rotate
 from inercal.instruments.triad import TriadModel
 from inercal.selfcal.platform.layout import QUANTITIES
-from inercal.selfcal.platform.model import output_quantities, rate_quantities
 from inercal.selfcal.platform.states import BIAS_WALK, ENTRY_OF, KIND_OF
 
 _ROUNDS = 6
@@ -104,11 +103,17 @@ class RigPlatform:
 
     def _beside_rate(self, rate: Array, force: Array, warm: Array) -> Array:
         """The part of the rate beside that of the triad, by the quantities in the order of the table."""
+        from inercal.selfcal.platform.model import (
+            rate_quantities,
+        )  # loads numba, which most corrections do without
+
         quantities = _plain(rate_quantities)(_axes(rate), _axes(force), warm)
         return _total(self.rate[:, _LINEAR:], quantities[_LINEAR:])
 
     def _beside_output(self, s: Array, warm: Array) -> Array:
         """The part of the outputs beside ``s``, those of the triad without bias."""
+        from inercal.selfcal.platform.model import output_quantities
+
         by = s / self.accelerometer.scale
         return _total(self.output, _plain(output_quantities)(_axes(s), _axes(by), warm))
 
