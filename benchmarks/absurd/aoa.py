@@ -28,7 +28,7 @@ _NOISE = {
 
 SEARCH = {
     "inercal.aoa.diagnosis.examination._explaining": lambda *_: [],
-    "inercal.aoa.task.diagnose": lambda *_: [],
+    "inercal.aoa.estimation.diagnose": lambda *_: [],
 }
 """The search for named faults -> what it finds where there are none; most of the time of a run."""
 

@@ -70,7 +70,7 @@ class Tags(html.parser.HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.seen.add(tag)
-        if tag != "img":
+        if tag not in ("img", "br"):  # these have no end
             self.open.append(tag)
 
     def handle_endtag(self, tag):

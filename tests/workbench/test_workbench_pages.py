@@ -198,7 +198,7 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     session = bench.sessions.begin_with("ferraris-si")
     job = await run(bench, session)
     found = json.loads(job.result.read_text())
-    found["findings"][0]["message"] += ': set imu.time_base = "0(50) ppm", or set imu.k2 = true'
+    found["findings"][0]["action"] = 'set imu.time_base = "0(50) ppm", or set imu.k2 = true'
     found["status"]["message"] += "; or take `inercal calibrate strapdown`"
     job.result.write_text(json.dumps(found))
     await user.open(f"/sessions/{session.id}/result")
@@ -207,12 +207,13 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     await user.should_see("imucal.json", retries=200)
     (written,) = bench.root.glob("jobs/*/imucal.json")
     assert "K_a" in written.read_text()
-    await user.should_not_see("Set imu.k2 = true")  # six positions do not tell it: such a study is refused
-    user.find('Set imu.time_base = "0(50) ppm"').click()
+    # six positions do not tell it: such a study is refused
+    await user.should_not_see(kind=ui.button, content="Set imu.k2 = true")
+    user.find(kind=ui.button, content='Set imu.time_base = "0(50) ppm"').click()
     await user.should_see("The study as text", retries=20)
     assert 'time_base = "0(50) ppm"' in session.study.read_text()
     await user.open(f"/sessions/{session.id}/result")
-    await user.should_not_see('Set imu.time_base = "0(50) ppm"')
+    await user.should_not_see(kind=ui.button, content='Set imu.time_base = "0(50) ppm"')
     user.find("Begin again with inercal calibrate strapdown").click()
     await user.should_see("The study as text", retries=20)
     (newest, *_) = bench.sessions

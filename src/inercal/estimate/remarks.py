@@ -64,9 +64,11 @@ def missed(
 
 
 def _hinted(code: str, texts: Mapping[str, str], hints: Mapping[str, str] | None) -> list[Finding]:
-    """A finding for each coefficient, with the hint to it, if any."""
+    """A finding for each coefficient, with the hint to it, if any; it harms nothing."""
     known = hints or {}
-    return [Finding(code, f"{text}; {known[k]}" if k in known else text) for k, text in texts.items()]
+    return [
+        Finding(code, f"{text}; {known[k]}" if k in known else text, harm=()) for k, text in texts.items()
+    ]
 
 
 def exact_gravity(site: Site, effect: str) -> list[Finding]:

@@ -236,7 +236,7 @@ def _increasing(time: Array, rows: NDArray[np.int64], where: str) -> tuple[NDArr
     left = np.delete(rows, taken)
     text = f"t: {counted(left.size, 'row')} not later than those before left out"
     code = "backward_time" if (np.diff(t) < 0.0).any() else "duplicate_time"
-    return rows[taken], [Finding(code, text, places("row", left + 1))]
+    return rows[taken], [Finding(code, text, places("row", left + 1), harm=())]
 
 
 def _lacking(rate: Array, rows: NDArray[np.int64], sensor: str) -> list[Finding]:
