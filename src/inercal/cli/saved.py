@@ -176,7 +176,8 @@ def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     """The calibration, to its file and as a table."""
     from inercal.estimate.files import save
 
-    say_findings(estimate.findings, output)
+    for finding in estimate.findings:  # all: what was not held is among them
+        output.say_finding(finding)
     if output.out is not None:
         save(estimate, output.out)
         output.say(f"calibration: {output.out}")
@@ -188,7 +189,8 @@ def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: Fi
     from inercal._files import write_text
 
     estimate = converted.estimate
-    say_findings(estimate.findings, output)
+    for finding in estimate.findings:
+        output.say_finding(finding)
     if output.out is None:
         written = {}
         text = "\n".join(converted.texts.values()).rstrip("\n")

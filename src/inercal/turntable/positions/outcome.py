@@ -217,21 +217,23 @@ def _farthest(readings: Readings, fit: Regression) -> str:
 
 
 def _too_large(fit: Regression) -> list[Finding]:
-    """A finding where errors of the table bend the readings beyond the second order, by more than their noise and by
-    what matters against u of a coefficient."""
+    """A finding where errors of the table bend the readings by more than their noise beyond the second order."""
     if fit.second is None:
         return []
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    least = LIMITS.second_order * np.sqrt(np.diag(fit.covariance))
+    weights = fit.weights(fit.noise)
+    # where no noise is left: a thousandth of what changes from position to position, or 1e-5 of all, does not matter
+    within = np.sqrt(np.diagonal(weights.within, axis1=1, axis2=2).mean(axis=0))
+    limit = np.maximum(
+        np.maximum(fit.noise, 1e-3 * within), 1e-5 * np.sqrt(np.square(weights.std).mean(axis=0))
+    )
     bent = []
     for k, (error, std) in enumerate(zip(chain.errors, chain.std, strict=True)):
         step = std * np.eye(len(chain.errors))[k]
         plus, minus = (fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0))
         even = 0.5 * (plus + minus) - straight - fit.second.squares[..., k]
         odd = 0.5 * (plus - minus) - fit.slopes[..., k] * std
-        above_noise = np.sqrt(np.mean(np.square(even) + np.square(odd), axis=0)) > fit.noise
-        moved = np.linalg.norm(fit.shift(np.stack([even, odd], axis=-1)), axis=1)
-        if np.any(above_noise) and np.any(moved > least):
+        if np.any(np.sqrt(np.mean(np.square(even) + np.square(odd), axis=0)) > limit):
             bent.append(error.name)
     if not bent:
         return []
