@@ -490,6 +490,15 @@ def test_squares_of_errors_that_stay_are_fitted_where_there_is_no_noise_above_th
     assert np.all(np.abs(estimate.values - [WHEEL[name] for name in estimate.names]) < 4.0 * estimate.u)
 
 
+def test_errors_that_stay_are_called_too_large_where_their_cubes_matter_against_u():
+    """Without noise, cubes of a degree shift terms by a fifth of u, and values are several u off."""
+    settings = study(FULL_RANK, table(60.0 * ARCMIN).with_scope(Scope.RIG), noise=None, earth_rate="stated")
+    made = simulate(
+        replace(settings, instrument=replace(settings.instrument, noise=0.0)), np.random.default_rng(2)
+    )
+    assert "large_errors" in codes_of(calibrate(made, settings).estimate)
+
+
 def test_a_relative_term_without_its_gain_is_refused():
     """K2 of an output in volts is nothing without K1."""
     settings = study(

@@ -217,23 +217,27 @@ def _farthest(readings: Readings, fit: Regression) -> str:
 
 
 def _too_large(fit: Regression) -> list[Finding]:
-    """A finding where errors of the table bend the readings by more than their noise beyond the second order."""
+    """A finding where errors of the table bend the readings by more than their noise beyond the second order.
+
+    Those that stay bend all readings at once, which has to move a coefficient as well, by what matters against its u:
+    readings without noise show bends that do not.
+    """
     if fit.second is None:
         return []
     chain, straight = fit.model.chain, fit.model.outputs(fit.angles, fit.c)
-    weights = fit.weights(fit.noise)
-    # where no noise is left: a thousandth of what changes from position to position, or 1e-5 of all, does not matter
-    within = np.sqrt(np.diagonal(weights.within, axis1=1, axis2=2).mean(axis=0))
-    limit = np.maximum(
-        np.maximum(fit.noise, 1e-3 * within), 1e-5 * np.sqrt(np.square(weights.std).mean(axis=0))
-    )
+    within = fit.weights(fit.noise).within
+    # where no noise is left, what is a thousand times below what changes from position to position does not matter
+    limit = np.maximum(fit.noise, 1e-3 * np.sqrt(np.diagonal(within, axis1=1, axis2=2).mean(axis=0)))
+    least = LIMITS.second_order * np.sqrt(np.diag(fit.covariance))
     bent = []
     for k, (error, std) in enumerate(zip(chain.errors, chain.std, strict=True)):
         step = std * np.eye(len(chain.errors))[k]
         plus, minus = (fit.model.outputs(fit.angles, fit.c, sign * step) for sign in (1.0, -1.0))
         even = 0.5 * (plus + minus) - straight - fit.second.squares[..., k]
         odd = 0.5 * (plus - minus) - fit.slopes[..., k] * std
-        if np.any(np.sqrt(np.mean(np.square(even) + np.square(odd), axis=0)) > limit):
+        above = np.any(np.sqrt(np.mean(np.square(even) + np.square(odd), axis=0)) > limit)
+        moved = np.linalg.norm(fit.shift(np.stack([even, odd], axis=-1)), axis=1)
+        if above and (not error.scope.constant or np.any(moved > least)):
             bent.append(error.name)
     if not bent:
         return []
