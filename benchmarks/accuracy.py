@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 from measure import Row, alone, in_turn, row, spread
 from sting_bands import FIGURES, FILTERS, PAPER, UPPER, errors_of, judged
 
-from inercal.estimate.executors import Threads
 from inercal.examples import FOLDER
-from inercal.selfcal.monte_carlo import campaign
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.estimate.executors import Threads
+from inercal.systems.selfcal.monte_carlo import campaign
 
 SEED = 20261121
 

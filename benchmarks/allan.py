@@ -15,9 +15,9 @@ import allantools
 import numpy as np
 from measure import Row, Spread, alone, in_turn, named, row
 
-from inercal.instruments.noise import NoiseModel
-from inercal.noise.coefficients import noise_coefficients
-from inercal.noise.deviation import allan_deviation
+from inercal.foundation.instruments.noise import NoiseModel
+from inercal.foundation.noise.coefficients import noise_coefficients
+from inercal.foundation.noise.deviation import allan_deviation
 
 INTERVAL = 0.01
 STABLE32 = Path(__file__).parents[1] / "tests" / "data" / "stable32"

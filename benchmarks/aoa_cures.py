@@ -17,10 +17,10 @@ import numpy as np
 from aoa_tunnels import STUDY
 from independent.aoa import DEG, G
 
-from inercal.aoa.disturbances import Disturbances, Shaking
-from inercal.aoa.settings import AoaSettings, MotionPlan
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
+from inercal.systems.aoa.disturbances import Disturbances, Shaking
+from inercal.systems.aoa.settings import AoaSettings, MotionPlan
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 SINE = MotionPlan("sine", 30.0, 500.0, mean=15.0 * DEG, amplitude=10.0 * DEG, frequency=1.0)
 SWEEP = MotionPlan("static", 30.0, 500.0, first=-10.0 * DEG, last=60.0 * DEG)

@@ -17,10 +17,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 import numpy as np
 from sting_study import BASE, DEG, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.fusion import run as fusion
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.fusion import run as fusion
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.simulate import simulate
 
 
 def endless(rows: int, block: float = 1000.0) -> None:

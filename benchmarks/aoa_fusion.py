@@ -21,14 +21,14 @@ import plain_fusion
 from measure import WALL, Row, alone, in_turn, named, peak, row, spread
 from sting_study import BASE, G, study
 
-from inercal.aoa.fusion import model, smoother
-from inercal.aoa.fusion import run as fusion
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.live import Live
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.settings import Timing
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.fusion import model, smoother
+from inercal.systems.aoa.fusion import run as fusion
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.live import Live
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.settings import Timing
+from inercal.systems.aoa.simulate import simulate
 
 #: states -> microseconds a row that are promised of the filter, and of filter and smoother
 PROMISED = {8: (1.0 / 1.2, 4.0 / 0.6), 19: (2.0, 10.0 / 0.6)}
@@ -130,8 +130,8 @@ import dataclasses, sys
 import numpy as np
 from measure import PROCESSOR, peak
 from sting_study import BASE, study
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import load_kernels, measure
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import load_kernels, measure
 n = int(sys.argv[1])
 settings = study(motion=dataclasses.replace(BASE, duration=1e-3 * min(n, 100_000)))
 record = to_record(simulate(settings, np.random.default_rng(1)).recording, settings)

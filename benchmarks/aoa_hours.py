@@ -18,9 +18,9 @@ import numpy as np
 from aoa_tunnels import STUDY
 from independent.aoa import DEG, Run, Tunnel, simulate
 
-from inercal.aoa.fusion.filter_result import FilterResult, estimate
-from inercal.aoa.fusion.problem import FilterProblem, problem
-from inercal.aoa.reading.recording import plain
+from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
+from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.reading.recording import plain
 
 NEXT = {
     "the same": {},

@@ -19,16 +19,16 @@ import numpy as np
 from independent.aoa import AXES, CASES, DEG, DELAYS, G, R, Tunnel, simulate
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from inercal.aoa.diagnosis.choice import decided
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import Layout
-from inercal.aoa.paper.methods import LOW_PASS, low_passed, measure
-from inercal.aoa.reading.recording import Recording, plain
-from inercal.aoa.settings import AoaSettings, Methods, Noise, Timing
-from inercal.aoa.simulate import to_record
-from inercal.aoa.task import measure as judged
-from inercal.geometry.site import Site
+from inercal.foundation.geometry.site import Site
+from inercal.systems.aoa.diagnosis.choice import decided
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.paper.methods import LOW_PASS, low_passed, measure
+from inercal.systems.aoa.reading.recording import Recording, plain
+from inercal.systems.aoa.settings import AoaSettings, Methods, Noise, Timing
+from inercal.systems.aoa.simulate import to_record
+from inercal.systems.aoa.task import measure as judged
 
 STUDY = AoaSettings(
     Site(G),

@@ -17,14 +17,14 @@ import pandas as pd
 from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
-from inercal.geometry.site import Site
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.method import matrices
-from inercal.imu.ferraris.readings import read_sections
-from inercal.imu.settings import ImuSettings
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.studies.ferraris import FerrarisTable, ferraris_settings
+from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.method import matrices
+from inercal.systems.imu.ferraris.readings import read_sections
+from inercal.systems.imu.settings import ImuSettings
 
 NAME, RATE, GRAVITY = "ferraris-si", 102.4, 9.81
 

@@ -18,12 +18,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from measure import Row, alone, in_turn, row
 
-from inercal.estimate.cluster import LOCAL, Cluster
-from inercal.estimate.executors import Executor, Processes, Serial
 from inercal.examples import FOLDER
-from inercal.face.study import read_study
-from inercal.fleet.batch import batch
-from inercal.selfcal.monte_carlo import campaign
+from inercal.faces.python.study import read_study
+from inercal.foundation.estimate.cluster import LOCAL, Cluster
+from inercal.foundation.estimate.executors import Executor, Processes, Serial
+from inercal.laboratory.fleet.batch import batch
+from inercal.systems.selfcal.monte_carlo import campaign
 
 
 def nothing(numbers: Iterable[int]) -> int:

@@ -19,14 +19,14 @@ import plain_tedaldi
 from measure import Row, Spread, alone, in_turn, named, of_processes, row
 
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.geometry import kernels
-from inercal.imu.multiposition.calibration import _turns
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.settings import Exclusion
-from inercal.imu.turns import carried, carried_with_derivatives
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.studies.load import load_imu_study
+from inercal.faces.studies.load import load_imu_study
+from inercal.foundation.geometry import kernels
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.systems.imu.multiposition.calibration import _turns
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.settings import Exclusion
+from inercal.systems.imu.turns import carried, carried_with_derivatives
 
 XSENS = EXAMPLES["xsens"]
 

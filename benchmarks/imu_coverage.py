@@ -16,12 +16,12 @@ from campaigns import aided, ferraris, rows
 from campaigns import imu as by_hand
 from campaigns.places import add_options, in_words, place_of, progress
 
-from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import run
-from inercal.imu.aided.coefficients import circumstances_of, names_of
-from inercal.imu.ferraris.method import NAMES
-from inercal.imu.multiposition.accelerometer import SQUARES
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.foundation.estimate.coverage import coverage
+from inercal.foundation.estimate.runs import run
+from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.systems.imu.aided.coefficients import circumstances_of, names_of
+from inercal.systems.imu.ferraris.method import NAMES
+from inercal.systems.imu.multiposition.accelerometer import SQUARES
 
 SEED = 20261121
 METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")

@@ -20,13 +20,13 @@ import numpy as np
 from campaigns.places import add_options, answers, in_words
 from independent import imu
 
-from inercal.errors import InputError
-from inercal.findings import Status
-from inercal.geometry.site import Site
-from inercal.imu.settings import ImuSettings
-from inercal.imu.task import calibrate
-from inercal.records.record import record_of
-from inercal.units import parse_unit
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.record import record_of
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.task import calibrate
 
 SEED = 20261122
 SITE = Site(imu.G, (), imu.LATITUDE)

@@ -26,8 +26,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from measure import PROCESSOR, Row, alone, row
 
+from inercal.bench.live.measurement import Measurement, measure
 from inercal.examples import FOLDER
-from inercal.live.measurement import Measurement, measure
 
 HEADER = b"t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n"
 STUDY = '[site]\ngravity = "9.81 m/s^2"\n[imu]\nmethod = "multiposition"\n'

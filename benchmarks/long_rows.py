@@ -24,7 +24,7 @@ from inercal.examples import FOLDER
 TEXT = "from pathlib import Path; from reading import recording; Path({path!r}).write_text(recording({n}))"
 MATRIX = "from pathlib import Path; from reading import stored; stored(Path({path!r}), {n})"
 
-OURS = "from inercal.records.read import read; read({path!r}{map})"
+OURS = "from inercal.foundation.records.read import read; read({path!r}{map})"
 PEERS = {
     "pandas": "import pandas; pandas.read_csv({path!r})",
     "pyarrow": "from pyarrow import csv; csv.read_csv({path!r}, read_options=csv.ReadOptions(use_threads=False))",
@@ -35,7 +35,7 @@ H5PY = "import h5py; h5py.File({path!r})['data'][()]"
 ALLAN = """
 import numpy as np
 from allan import INTERVAL, lengths, noise
-from inercal.noise.deviation import allan_deviation
+from inercal.foundation.noise.deviation import allan_deviation
 x = noise({n})
 if {holes}:
     x[np.random.default_rng(2).choice(len(x), len(x) // 10_000, replace=False)] = np.nan
@@ -45,7 +45,7 @@ allan_deviation(x, INTERVAL, lengths(len(x), 50) * INTERVAL)
 SAMPLED = """
 import numpy as np
 from sensitivity import CHAIN, OUTPUTS
-from inercal.sensitivities.sampled import analyse
+from inercal.foundation.sensitivities.sampled import analyse
 angles = np.radians(np.random.default_rng(0).uniform(0.0, 360.0, ({n}, 2)))
 analyse(CHAIN, OUTPUTS, angles, 1024, np.random.default_rng(1))
 """

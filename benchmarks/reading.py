@@ -23,7 +23,7 @@ import polars
 from measure import Row, Spread, alone, in_turn, named, row
 from pyarrow import csv
 
-from inercal.records.read import read
+from inercal.foundation.records.read import read
 
 TITLES = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]"
 HOLE = 20_000

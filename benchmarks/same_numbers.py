@@ -39,8 +39,8 @@ import numpy as np
 
 from inercal.cli import run
 from inercal.examples import EXAMPLES
-from inercal.selfcal.estimators import KINDS
-from inercal.validate.run import SYSTEMS, cases_of
+from inercal.faces.validate.run import SYSTEMS, cases_of
+from inercal.systems.selfcal.estimators import KINDS
 
 DOCS = Path(__file__).parents[1] / "docs"
 

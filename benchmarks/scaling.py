@@ -30,33 +30,33 @@ from measure import in_turn, named
 from sting_study import BASE, study
 
 import sensitivity
-from inercal.aoa.fusion import run as fusion
-from inercal.aoa.fusion import smoother
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.settings import Timing
-from inercal.aoa.simulate import simulate
-from inercal.designs.candidates import Candidates
-from inercal.designs.criteria import D
-from inercal.designs.exchange import exchange
-from inercal.designs.spherical import NAMES, basis
 from inercal.examples import FOLDER
-from inercal.geometry.site import Site
-from inercal.imu.multiposition.calibration import calibrate_multiposition
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_truth, hand_poses
-from inercal.imu.simulate import simulate as simulate_imu
-from inercal.noise.deviation import allan_deviation
-from inercal.records.read import read
-from inercal.report.style import COLOURS, figure, powers_of_ten, svg
-from inercal.rigs.chain import Chain, Error
-from inercal.rigs.outputs import gravity_reference
-from inercal.rigs.plans import grid
-from inercal.selfcal.before.simulate import experiment
-from inercal.selfcal.before.simulate import simulate as simulate_platform
-from inercal.selfcal.filters.problem import problem as platform_problem
-from inercal.selfcal.filters.run import estimate as estimate_platform
-from inercal.sensitivities.exact import analyse
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.report.style import COLOURS, figure, powers_of_ten, svg
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.designs.candidates import Candidates
+from inercal.foundation.designs.criteria import D
+from inercal.foundation.designs.exchange import exchange
+from inercal.foundation.designs.spherical import NAMES, basis
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.noise.deviation import allan_deviation
+from inercal.foundation.records.read import read
+from inercal.foundation.rigs.chain import Chain, Error
+from inercal.foundation.rigs.outputs import gravity_reference
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.sensitivities.exact import analyse
+from inercal.systems.aoa.fusion import run as fusion
+from inercal.systems.aoa.fusion import smoother
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.settings import Timing
+from inercal.systems.aoa.simulate import simulate
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_truth, hand_poses
+from inercal.systems.imu.simulate import simulate as simulate_imu
+from inercal.systems.selfcal.before.simulate import experiment
+from inercal.systems.selfcal.before.simulate import simulate as simulate_platform
+from inercal.systems.selfcal.filters.problem import problem as platform_problem
+from inercal.systems.selfcal.filters.run import estimate as estimate_platform
 
 
 @dataclass(frozen=True)

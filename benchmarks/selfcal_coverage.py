@@ -16,9 +16,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from campaigns.places import add_options, in_words, place_of, progress
 
 from inercal.examples import FOLDER
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.monte_carlo import campaign
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.monte_carlo import campaign
 
 SEED = 20261121
 

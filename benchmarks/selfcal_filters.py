@@ -18,11 +18,11 @@ import plain_filterpy
 from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.settings import Filter
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.settings import Filter
 
 CHOLESKY, EIGEN = "Cholesky first", "eigen"
 PEERS = {CHOLESKY: plain_filterpy.cholesky_first, EIGEN: plain_filterpy.eigen}

@@ -24,14 +24,14 @@ import numpy as np
 from independent.selfcal import THREE, UG, Drive, simulated, study
 from scipy.linalg import toeplitz
 
-from inercal.selfcal.before.bounds import bounds, nominal_attitudes
-from inercal.selfcal.before.considered import both
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.platform.coefficients import product_slope
-from inercal.selfcal.platform.plan import CommandedMotion
-from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.states import STATES
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.systems.selfcal.before.bounds import bounds, nominal_attitudes
+from inercal.systems.selfcal.before.considered import both
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.platform.coefficients import product_slope
+from inercal.systems.selfcal.platform.plan import CommandedMotion
+from inercal.systems.selfcal.platform.recording import Recording
+from inercal.systems.selfcal.platform.states import STATES
 
 
 def covariance_in_time(level: float, step: float, n: int) -> np.ndarray:

@@ -15,8 +15,8 @@ import numpy as np
 from campaigns.places import add_options, answers, in_words
 from campaigns.rig import SEED, Calibration, posed
 
-from inercal.estimate.coverage import coverage, nees
-from inercal.selfcal.platform.states import ADDED, RIG
+from inercal.foundation.estimate.coverage import coverage, nees
+from inercal.systems.selfcal.platform.states import ADDED, RIG
 
 
 def main() -> None:

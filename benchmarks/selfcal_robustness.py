@@ -16,15 +16,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from inercal.examples import FOLDER
-from inercal.geometry.rotations import boxplus
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.settings import Disturbances
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.geometry.rotations import boxplus
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.settings import Disturbances
 
 SEED = 20261121
 STUDY = load_selfcal_study(FOLDER / "selfcal.toml")

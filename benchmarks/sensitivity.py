@@ -18,12 +18,12 @@ from SALib.analyze import sobol as salib_indices
 from SALib.sample import sobol as salib_sample
 from scipy.stats import qmc
 
-from inercal.rigs.chain import Chain, Joint
-from inercal.rigs.distribution import uniform
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.sensitivities.exact import analyse
+from inercal.foundation.rigs.chain import Chain, Joint
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities.exact import analyse
 
 ROWS = 1024
 SIZE = np.radians(2.0 / 60.0)

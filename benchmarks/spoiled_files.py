@@ -29,9 +29,9 @@ import numpy as np
 from spoiled import strict, whole
 from spoiled.spoil import spoiled
 
-from inercal.errors import InercalError, RecordError
-from inercal.records.read import arrays, bags, child, limits
-from inercal.records.read.table import LARGEST
+from inercal.foundation.errors import InercalError, RecordError
+from inercal.foundation.records.read import arrays, bags, child, limits
+from inercal.foundation.records.read.table import LARGEST
 
 SEED = 20261122
 A_CHILD = 40
@@ -60,7 +60,7 @@ def case(name, number):
 def read(name, path, folder):
     """Columns by name and codes of findings of a file, as inercal reads it."""
     if name.startswith("result"):
-        from inercal.estimate.files import load
+        from inercal.foundation.estimate.files import load
 
         return {"values": load(path).values}, set()
     if name.startswith("xml"):
@@ -68,21 +68,21 @@ def read(name, path, folder):
 
         return {"values": estimate_of_certificate(path).values}, set()
     if name == "checkpoint":
-        from inercal.estimate.checkpoint import load as load_state
+        from inercal.foundation.estimate.checkpoint import load as load_state
 
         like = {"x": np.zeros(1), "n": 0}
         state = load_state(path, "test", "same", like)
         return {"x": state["x"]}, set()
     if name.startswith("map"):
-        from inercal.records.maps import read_map
+        from inercal.foundation.records.maps import read_map
 
         return {"parts": np.array([len(read_map(path).parts)])}, set()
     if name == "yaml":
-        from inercal.convert.kalibr import loaded
+        from inercal.faces.convert.kalibr import loaded
 
         loaded(path.read_text(errors="surrogateescape"), path)
         return {}, set()
-    from inercal.records.read import read as read_record
+    from inercal.foundation.records.read import read as read_record
 
     record_map = None
     if (text := whole.FORMATS[name][2]) is not None:

@@ -20,12 +20,12 @@ import numpy as np
 from campaigns.places import add_options, answers, in_words
 from independent import strapdown
 
-from inercal.findings import CODES, Harm, Status
-from inercal.geometry.site import Site
-from inercal.records.record import record_of
-from inercal.strapdown.settings import TURN_NOISE, Noise, Prior, Rests, StrapdownSettings
-from inercal.strapdown.task import calibrate
-from inercal.units import parse_unit
+from inercal.foundation.findings import CODES, Harm, Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.record import record_of
+from inercal.foundation.units import parse_unit
+from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Prior, Rests, StrapdownSettings
+from inercal.systems.strapdown.task import calibrate
 
 SEED = 20261123
 TEST, DPH = strapdown.Test(), strapdown.DEG_PER_H

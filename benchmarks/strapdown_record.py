@@ -17,14 +17,14 @@ import numpy as np
 from measure import Row, Spread, alone, in_turn, of_processes, row, spread
 
 from inercal.examples import FOLDER
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.strapdown.batch import fit
-from inercal.strapdown.error_state import filtered
-from inercal.strapdown.reading import samples_of
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.studies.load import load_strapdown_study
-from inercal.validate.strapdown import errors_over_u
+from inercal.faces.studies.load import load_strapdown_study
+from inercal.faces.validate.strapdown import errors_over_u
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.systems.strapdown.batch import fit
+from inercal.systems.strapdown.error_state import filtered
+from inercal.systems.strapdown.reading import samples_of
+from inercal.systems.strapdown.rests import found_rests, nodes_of
 
 RECORD = str(FOLDER / "strapdown.bin.gz")
 WORDS = ("calibrate", "strapdown", RECORD, "--map", str(FOLDER / "strapdown-map.toml"), "--study",

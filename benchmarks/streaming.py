@@ -21,7 +21,7 @@ import numpy as np
 from measure import Row, alone, in_turn, named, of_processes, row
 
 from inercal.examples import FOLDER
-from inercal.noise.running import cascade, empty_octaves, empty_window, load_kernels, slide
+from inercal.foundation.noise.running import cascade, empty_octaves, empty_window, load_kernels, slide
 
 WINDOW = 101
 TITLES = ("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z")

@@ -27,7 +27,7 @@ import numpy as np
 from absurd.runs import ROOMS, SEED, Absurd, load, one
 from campaigns.places import add_options, answers, in_words
 
-from inercal._files import write_text
+from inercal.foundation._files import write_text
 
 CHUNK = 1000
 

@@ -12,13 +12,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from campaigns.places import add_options, in_words, place_of, progress
 
-from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.runs import run
-from inercal.instruments.by_angle import EXTRA, channel_model
-from inercal.validate.gyrowheel import (
+from inercal.faces.validate.gyrowheel import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
+from inercal.foundation.estimate.coverage import coverage, nees
+from inercal.foundation.estimate.runs import run
+from inercal.foundation.instruments.by_angle import EXTRA, channel_model
 
 SEED = 20261121
 

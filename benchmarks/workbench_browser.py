@@ -22,7 +22,7 @@ from measure import WALL, Row, alone, row
 from playwright.sync_api import Page, sync_playwright
 from workbench_speed import PAGES, recording
 
-from inercal.workbench.bench import open_bench
+from inercal.bench.workbench.bench import open_bench
 
 CHROMIUM = next(
     (

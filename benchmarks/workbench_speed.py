@@ -19,15 +19,15 @@ import numpy as np
 import orjson
 from measure import PROCESSOR, WALL, Row, Spread, alone, in_turn, row
 
+from inercal.bench.workbench.bench import Bench, open_bench
+from inercal.bench.workbench.charts import figure
+from inercal.bench.workbench.plans import named
+from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
-from inercal.face.foresight import course, foresight
-from inercal.face.study import read_study
-from inercal.studies.text import with_keys
+from inercal.faces.python.foresight import course, foresight
+from inercal.faces.python.study import read_study
+from inercal.faces.studies.text import with_keys
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench.bench import Bench, open_bench
-from inercal.workbench.charts import figure
-from inercal.workbench.plans import named
-from inercal.workbench.sessions import STUDY
 
 PLANS = {
     "turntable": "tumble.toml",
@@ -123,7 +123,7 @@ async def pages(bench: Bench, rounds: int) -> list[Row]:
     """Pages made by the server, of the example selfcal."""
     from nicegui.testing.user_simulation import user_simulation
 
-    from inercal.workbench.pages import add_pages
+    from inercal.bench.workbench.pages import add_pages
 
     session = bench.sessions.begin_with("selfcal")
     await asyncio.to_thread(bench.queue.wait, bench.run(session).id)

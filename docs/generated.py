@@ -90,7 +90,7 @@ def _meaning(argument: Any) -> str:
 
 def study(kind: str) -> str:
     """Every key of one kind of study (``imu``, ``strapdown``, ``turntable``, ``selfcal``, ``aoa``), table by table."""
-    from inercal.studies.schema import json_schema
+    from inercal.faces.studies.schema import json_schema
 
     whole = json_schema()
     return _tables(whole["$defs"][f"{kind.capitalize()}StudyFile"], whole["$defs"])
@@ -98,8 +98,8 @@ def study(kind: str) -> str:
 
 def lab() -> str:
     """Every key of a ``lab.toml``, table by table."""
+    from inercal.faces.studies.schema import TomlSchema
     from inercal.laboratory.certificate.lab import LabFile
-    from inercal.studies.schema import TomlSchema
 
     whole = LabFile.model_json_schema(schema_generator=TomlSchema)
     return _tables(whole, whole["$defs"])
@@ -107,8 +107,8 @@ def lab() -> str:
 
 def maps() -> str:
     """Every key of a column map, table by table."""
-    from inercal.records.maps import MapEntry, NamedFileEntry
-    from inercal.studies.schema import TomlSchema
+    from inercal.faces.studies.schema import TomlSchema
+    from inercal.foundation.records.maps import MapEntry, NamedFileEntry
 
     whole, named = (
         model.model_json_schema(schema_generator=TomlSchema) for model in (MapEntry, NamedFileEntry)
@@ -232,7 +232,7 @@ def _plain_type(found: Schema, definitions: Mapping[str, Schema]) -> str:
 
 def _literal(value: object) -> str:
     """A value as TOML writes it."""
-    from inercal.studies.commented import toml
+    from inercal.faces.studies.commented import toml
 
     return code(toml(value))
 
@@ -242,14 +242,14 @@ def _literal(value: object) -> str:
 
 def status() -> str:
     """Codes of the verdict."""
-    from inercal.findings import Status
+    from inercal.foundation.findings import Status
 
     return table(("code", "meaning"), ((code(each.value), each.meaning) for each in Status))
 
 
 def findings() -> str:
     """Codes of the findings."""
-    from inercal.findings import CODES
+    from inercal.foundation.findings import CODES
 
     return table(
         ("code", "meaning", "shifts values"),
@@ -259,21 +259,21 @@ def findings() -> str:
 
 def terms() -> str:
     """The table of terms: symbol, name, unit, in the order of results."""
-    from inercal.instruments.terms import TERMS
+    from inercal.foundation.instruments.terms import TERMS
 
     return _terms(TERMS.values())
 
 
 def noise_terms() -> str:
     """The terms of noise."""
-    from inercal.instruments.terms import NOISE_TERMS
+    from inercal.foundation.instruments.terms import NOISE_TERMS
 
     return _terms(NOISE_TERMS.values())
 
 
 def model_terms() -> str:
     """The terms of a model that pitches; those of its accelerometers are numbered."""
-    from inercal.instruments.terms import MODEL_TERMS, NUMBERED_TERMS
+    from inercal.foundation.instruments.terms import MODEL_TERMS, NUMBERED_TERMS
 
     numbered = (
         replace(each, symbol=f"{each.symbol}_1, ..", name=each.name.format("1, .."))
@@ -291,8 +291,8 @@ def _terms(found: Iterable[Any]) -> str:
 
 def reference_types() -> str:
     """The reference types of certificates."""
-    from inercal.instruments.reference_types import OTHERS
-    from inercal.instruments.reference_types import reference_types as types
+    from inercal.foundation.instruments.reference_types import OTHERS
+    from inercal.foundation.instruments.reference_types import reference_types as types
 
     rows = [(code(kind), meaning, code(unit)) for kind, (meaning, unit) in types().items()]
     return table(

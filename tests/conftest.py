@@ -54,7 +54,7 @@ def yardstick():
 
 def compiled_since(moment):
     """True if any process has compiled a kernel since."""
-    from inercal._jit import cache_folder
+    from inercal.foundation._jit import cache_folder
 
     folder = cache_folder()
     return folder is None or any(path.stat().st_mtime >= moment for path in folder.rglob("*"))

@@ -17,7 +17,7 @@ Trees = Mapping[str, ast.Module]
 
 
 def room(module: str) -> str:
-    """``records`` of ``inercal.records.read.text``; ``inercal`` of the package itself."""
+    """``records`` of ``inercal.foundation.records.read.text``; ``inercal`` of the package itself."""
     return [*module.split("."), "inercal"][1]
 
 

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from sqlalchemy.engine import make_url
 
-from inercal.addresses import (
+from inercal.foundation.addresses import (
     HIDDEN,
     hidden_in,
     holds_secret,
@@ -14,9 +14,9 @@ from inercal.addresses import (
     without_login,
     without_secrets,
 )
-from inercal.addresses import PLAIN as KNOWN
-from inercal.errors import InputError
-from inercal.units import shown
+from inercal.foundation.addresses import PLAIN as KNOWN
+from inercal.foundation.errors import InputError
+from inercal.foundation.units import shown
 from rows import for_each
 
 SHOWN = {

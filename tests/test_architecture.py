@@ -96,7 +96,7 @@ def read_imports(module, functions):
 
 
 def room(module):
-    """``records`` of ``inercal.records.read.text``; empty for the package itself."""
+    """``records`` of ``inercal.foundation.records.read.text``; empty for the package itself."""
     return [*module.split("."), ""][1]
 
 
@@ -164,7 +164,9 @@ def test_one_system_does_not_know_another():
 
 def test_records_stand_on_their_own():
     """A record is data: units and errors, no numerics."""
-    rooms = {room(other) for other in imports("inercal.records.record") if other.startswith("inercal")}
+    rooms = {
+        room(other) for other in imports("inercal.foundation.records.record") if other.startswith("inercal")
+    }
     assert rooms <= {"arrays", "units", "errors", "findings", "inputs", "records"}
 
 
@@ -263,7 +265,7 @@ def test_rooms_within_a_system_stand_on_each_other(system):
 
 def test_methods_of_an_imu_do_not_know_each_other():
     methods = {
-        f"inercal.imu.{method}"
+        f"inercal.systems.imu.{method}"
         for method in ("multiposition", "ferraris", "aided", "known_rates", "known_turns", "temperature")
     }
 
@@ -473,7 +475,7 @@ def test_no_module_is_imported_by_a_name_made_of_text():
     """An editor follows a system by its record, from the verb to the fit."""
     known = {
         "inercal",  # its public names
-        "inercal.records.read",  # formats of files
+        "inercal.foundation.records.read",  # formats of files
     }
     made = [
         module
@@ -492,8 +494,8 @@ def test_kinds_of_study_are_named_by_their_systems():
     known = {
         "inercal.cli.tree",  # the text of help
         "inercal.examples",  # their names and commands
-        "inercal.estimate.shown",  # on a floor below the systems
-        "inercal.validate.case",  # names of examples
+        "inercal.foundation.estimate.shown",  # on a floor below the systems
+        "inercal.faces.validate.case",  # names of examples
     }
     tables = [
         f"{module}, line {node.lineno}"
@@ -513,7 +515,7 @@ def test_only_the_command_line_prints():
 
 def test_numba_has_one_door():
     users = {module for module in MODULES for other in imports(module) if other.split(".")[0] == "numba"}
-    assert users == {"inercal._jit"}
+    assert users == {"inercal.foundation._jit"}
 
 
 def test_randomness_is_always_handed_in():
@@ -579,5 +581,5 @@ except ImportError:
     finally:
         del TREES["sample"]
     assert len(MODULES) > 40
-    assert floor("inercal.imu.multiposition.figures") > floor("inercal.imu.task")
-    assert room("inercal.records.read.text") == "records"
+    assert floor("inercal.systems.imu.multiposition.figures") > floor("inercal.systems.imu.task")
+    assert room("inercal.foundation.records.read.text") == "records"

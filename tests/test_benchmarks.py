@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "benchmarks"

@@ -10,8 +10,8 @@ import threading
 
 import pytest
 
-from inercal._files import replacing, write_bytes, write_text
-from inercal.errors import InputError
+from inercal.foundation._files import replacing, write_bytes, write_text
+from inercal.foundation.errors import InputError
 
 
 @pytest.fixture
@@ -84,7 +84,7 @@ def test_an_error_in_the_block_leaves_everything_as_it_was(old, error):
 
 def test_a_killed_process_leaves_the_old_content(old):
     code = (
-        "import os, signal, sys; from inercal._files import replacing\n"
+        "import os, signal, sys; from inercal.foundation._files import replacing\n"
         "with replacing(sys.argv[1]) as file:\n"
         "    file.write(b'half' * 10_000); file.flush(); os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 import inercal
+from inercal.bench.workbench.advice import Advice, advice_of
 from inercal.cli.options import Output, ReportOutput
 from inercal.cli.outcome import say_findings
-from inercal.estimate.result import without_coefficients
-from inercal.findings import EVERYTHING, Finding, most_harmful, with_alternatives
-from inercal.report.html import render
-from inercal.workbench.advice import Advice, advice_of
+from inercal.faces.report.html import render
+from inercal.foundation.estimate.result import without_coefficients
+from inercal.foundation.findings import EVERYTHING, Finding, most_harmful, with_alternatives
 
 WEAK = Finding(
     "weak_test",

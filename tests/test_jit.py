@@ -42,8 +42,8 @@ def python(program, *, path=PACKAGE.parent, **environment):
 
 USE_A_KERNEL = """
 import numpy as np
-from inercal import _jit
-from inercal.geometry import kernels
+from inercal.foundation import _jit
+from inercal.foundation.geometry import kernels
 assert kernels.normalize(np.array([2.0, 0.0, 0.0, 0.0])) == (1.0, 0.0, 0.0, 0.0)
 print(_jit.cache_folder())
 """
@@ -76,7 +76,7 @@ def test_a_second_process_compiles_nothing(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "inercal", ignore=shutil.ignore_patterns("__pycache__"))
     program = """
 import numpy as np
-from inercal.geometry import kernels
+from inercal.foundation.geometry import kernels
 q, v = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
 kernels.multiply(q, q), kernels.normalize(q), kernels.rotate(q, v), kernels.exp(v), kernels.step(q, v, 0.1)
 kernels.integrate(q, np.zeros((1, 3)), np.zeros(1), np.zeros((2, 4)))
@@ -109,7 +109,7 @@ def test_kernels_run_as_plain_python_too():
     """For debuggers and coverage, which do not see compiled bodies."""
     program = """
 import numpy as np
-from inercal.geometry import kernels, rotations
+from inercal.foundation.geometry import kernels, rotations
 assert not hasattr(kernels.step, "stats")
 rng = np.random.default_rng(4)
 q0, omega = rotations.normalize(rng.normal(size=4)), rng.normal(size=(9, 3))

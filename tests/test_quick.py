@@ -14,11 +14,11 @@ def order(*files):
 @pytest.fixture(scope="module", autouse=True)
 def _every_import_read():
     """Seconds that no single test is to pay."""
-    order("src/inercal/units.py")
+    order("src/inercal/foundation/units.py")
 
 
 def test_the_nearest_tests_come_first_and_the_house_before_them():
-    found = order("src/inercal/aoa/paper/static.py")
+    found = order("src/inercal/systems/aoa/paper/static.py")
     assert found[:3] == ["tests/test_architecture.py", "tests/laws", "tests/aoa/test_aoa_static.py"]
     # aoa's own, before those that run commands
     assert found.index("tests/aoa/test_aoa_lever.py") < found.index("tests/cli/test_aoa_command.py")
@@ -45,11 +45,11 @@ def test_what_nothing_imports_asks_for_no_more_than_the_house(file):
 
 
 def test_data_of_a_package_are_of_the_package():
-    assert "tests/report/test_html.py" in order("src/inercal/report/page.html")
+    assert "tests/report/test_html.py" in order("src/inercal/faces/report/page.html")
 
 
 def test_however_much_is_asked_for_only_the_nearest_files_are_read():
-    found = order("src/inercal/units.py")
+    found = order("src/inercal/foundation/units.py")
     assert len(found) == len(quick.ALWAYS) + quick.FILES
     assert "tests/test_units.py" in found[:10]
 

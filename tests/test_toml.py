@@ -6,8 +6,8 @@ import pytest
 from pydantic import BeforeValidator, Field, StrictBool, StrictInt
 from pydantic_core import PydanticCustomError
 
-from inercal._toml import Strict, check, read_toml
-from inercal.errors import InputError, MapError, StudyError
+from inercal.foundation._toml import Strict, check, read_toml
+from inercal.foundation.errors import InputError, MapError, StudyError
 from rows import for_each
 
 

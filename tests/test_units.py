@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import QuantityError
-from inercal.report.style import plain_unit
-from inercal.units import _TABLE, STANDARD_GRAVITY, parse_quantity, parse_unit, shown
+from inercal.faces.report.style import plain_unit
+from inercal.foundation.errors import QuantityError
+from inercal.foundation.units import _TABLE, STANDARD_GRAVITY, parse_quantity, parse_unit, shown
 from rows import for_each
 
 UNITS = [(unit, dimension) for dimension, (_, factors) in _TABLE.items() for unit in factors]

@@ -9,15 +9,15 @@ from absurd.draws import Draws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
-from inercal.aoa.estimators import STATICS
-from inercal.aoa.result.columns import angles_record, points_record
-from inercal.aoa.result.tables import answer, delays, on_page, on_terminal, rest_of_fit, use_of_fit
-from inercal.aoa.settings import GYROS, Methods
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import load_kernels, measure
-from inercal.errors import StudyError
-from inercal.stream.aoa import Aoa
-from inercal.studies.aoa import aoa_study
+from inercal.faces.stream.aoa import Aoa
+from inercal.faces.studies.aoa import aoa_study
+from inercal.foundation.errors import StudyError
+from inercal.systems.aoa.estimators import STATICS
+from inercal.systems.aoa.result.columns import angles_record, points_record
+from inercal.systems.aoa.result.tables import answer, delays, on_page, on_terminal, rest_of_fit, use_of_fit
+from inercal.systems.aoa.settings import GYROS, Methods
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import load_kernels, measure
 
 _NOISE = {
     "accelerometer": (1e-4, "g"),
@@ -27,8 +27,8 @@ _NOISE = {
 }
 
 SEARCH = {
-    "inercal.aoa.diagnosis.examination._explaining": lambda *_: [],
-    "inercal.aoa.estimation.diagnose": lambda *_: [],
+    "inercal.systems.aoa.diagnosis.examination._explaining": lambda *_: [],
+    "inercal.systems.aoa.estimation.diagnose": lambda *_: [],
 }
 """The search for named faults -> what it finds where there are none; most of the time of a run."""
 

@@ -3,14 +3,14 @@
 from absurd import laws
 from absurd.faults import spoiled
 from absurd.outcome import made
-from inercal.instruments.by_angle import CHANNELS, channel_model
-from inercal.instruments.terms import TERMS
-from inercal.rigs.plans import NAMED
-from inercal.rigs.tables import slots
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.display import tolerances
-from inercal.turntable.positions.calibration import PositionCalibration
-from inercal.turntable.task import calibrate, simulate
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
+from inercal.foundation.instruments.terms import TERMS
+from inercal.foundation.rigs.plans import NAMED
+from inercal.foundation.rigs.tables import slots
+from inercal.systems.turntable.display import tolerances
+from inercal.systems.turntable.positions.calibration import PositionCalibration
+from inercal.systems.turntable.task import calibrate, simulate
 
 #: unit in the table of terms -> a usual size and its unit, by kind of output
 _SIZES = {

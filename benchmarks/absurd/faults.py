@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.records.read.table import LARGEST
-from inercal.records.record import Record
+from inercal.foundation.records.read.table import LARGEST
+from inercal.foundation.records.record import Record
 
 
 def spoiled(record, draws, groups, most=3):

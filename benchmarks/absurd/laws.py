@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 
-from inercal.errors import InputError
-from inercal.estimate.files import to_json
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import to_json
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
 
 FAR = 1000.0
 """Standard uncertainties by which the result of a run that obeys its study must not be off, where it is called ok."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from absurd import laws
 from absurd.draws import Draws
-from inercal.errors import InercalError
+from inercal.foundation.errors import InercalError
 
 
 @dataclass

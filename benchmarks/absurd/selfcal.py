@@ -6,15 +6,15 @@ from absurd import laws
 from absurd.faults import spoiled
 from absurd.outcome import made
 from absurd.stream import streamed
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.find_base import stated_well
-from inercal.selfcal.platform.coefficients import GROUPS
-from inercal.selfcal.result.columns import history_record
-from inercal.selfcal.task import calibrate, compared, load_kernels
-from inercal.stream.selfcal import Selfcal
-from inercal.studies.selfcal import selfcal_study
+from inercal.faces.stream.selfcal import Selfcal
+from inercal.faces.studies.selfcal import selfcal_study
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.find_base import stated_well
+from inercal.systems.selfcal.platform.coefficients import GROUPS
+from inercal.systems.selfcal.result.columns import history_record
+from inercal.systems.selfcal.task import calibrate, compared, load_kernels
 
 #: group -> its usual prior and unit
 _PRIOR = {
@@ -28,7 +28,7 @@ _PRIOR = {
     "beta": (60.0, "arcsec"),
 }
 
-SEARCH = {"inercal.selfcal.task.diagnose": lambda *_: []}
+SEARCH = {"inercal.systems.selfcal.task.diagnose": lambda *_: []}
 """The search for named faults -> what it finds where there are none; most of the time of a run."""
 
 _COLUMNS = [[f"{sensor}_{axis}" for axis in "xyz"] for sensor in ("wc", "th", "acc")]

@@ -4,9 +4,9 @@ import io
 
 import numpy as np
 
-from inercal.records.write import number
-from inercal.stream.lines import Lines
-from inercal.stream.run import run
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import run
+from inercal.foundation.records.write import number
 
 
 def lines_of(record, say):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.simulate import Program, Truth, simulate
-from inercal.imu.settings import AidedSettings, ImuSettings
-from inercal.instruments.triad import TriadModel
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
+from inercal.foundation.arrays import Array
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.instruments.triad import TriadModel
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.systems.imu.aided.calibration import calibrate_aided
+from inercal.systems.imu.aided.simulate import Program, Truth, simulate
+from inercal.systems.imu.settings import AidedSettings, ImuSettings
 
 GRAVITY, GRAVITY_U = 9.81, 2e-4
 """Gravity as stated to the calibration [m/s^2], and its standard uncertainty."""

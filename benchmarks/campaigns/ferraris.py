@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.simulate import Session, simulate_session, true_values
-from inercal.imu.settings import FerrarisSettings, ImuSettings
-from inercal.imu.simulate import ImuTruth, Noise, draw_full_truth
+from inercal.foundation.arrays import Array
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.simulate import Session, simulate_session, true_values
+from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
+from inercal.systems.imu.simulate import ImuTruth, Noise, draw_full_truth
 
 ALIGNMENT = math.radians(0.5)
 """Standard deviation of each direction of a position and of the axis of a turn, in either direction across it [rad]."""
@@ -42,8 +42,8 @@ def one_calibration(rng: np.random.Generator) -> dict[str, Array]:
 
     Returns
     -------
-    ``error`` and ``u`` (33,) in the order of `inercal.imu.ferraris.method.NAMES`, their ``dof`` (33,), and ``sound``
-    (1 if the status was ok).
+    ``error`` and ``u`` (33,) in the order of `inercal.systems.imu.ferraris.method.NAMES`, their ``dof`` (33,), and
+    ``sound`` (1 if the status was ok).
     """
     return _one(rng, ALIGNMENT)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.multiposition.calibration import calibrate_multiposition
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.foundation.arrays import Array
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
 GRAVITY, GRAVITY_U = 9.81, 1e-4
 """Gravity as stated to the calibration [m/s^2], and its standard uncertainty."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.instruments.noise import SYMBOLS, NoiseModel
-from inercal.noise.coefficients import noise_coefficients
-from inercal.noise.deviation import allan_deviation
+from inercal.foundation.arrays import Array
+from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
+from inercal.foundation.noise.coefficients import noise_coefficients
+from inercal.foundation.noise.deviation import allan_deviation
 
 SAMPLES, INTERVAL = 20000, 0.01
 """Samples of a recording, and their interval [s]."""

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from inercal import __version__
-from inercal._files import write_text
 from inercal.cli.options import CheckpointOption, ClusterOption, WorkersOption, count_of
-from inercal.errors import InercalError, InputError
-from inercal.estimate.cluster import place
-from inercal.estimate.executors import Executor, computed, divided
+from inercal.foundation._files import write_text
+from inercal.foundation.errors import InercalError, InputError
+from inercal.foundation.estimate.cluster import place
+from inercal.foundation.estimate.executors import Executor, computed, divided
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

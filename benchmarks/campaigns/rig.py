@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "studies"))
 import numpy as np
 from test_rig_states import BASE, drawn, recorded
 
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.settings import Model
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.settings import Model
 
 SEED = 20261123
 

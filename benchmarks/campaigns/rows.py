@@ -10,23 +10,23 @@ from dataclasses import replace
 import numpy as np
 
 from campaigns import imu as by_hand
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.limits import LIMITS
-from inercal.imu.multiposition.calibration import calibrate_multiposition
-from inercal.imu.settings import (
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.limits import LIMITS
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
+from inercal.systems.imu.settings import (
     Disturbances,
     ImuSettings,
     KnownRatesSettings,
     KnownTurnsSettings,
     MeansSettings,
 )
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
-from inercal.imu.task import calibrate, calibrate_files
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.systems.imu.task import calibrate, calibrate_files
 
 G = 9.81
 SITE = Site(G, (GravityInput("gravity", 2e-4, "m/s^2", 1.0),), 0.8, 0.0)
@@ -129,7 +129,7 @@ def drawn(method, rng):
 
 
 def _one(method, rng):
-    """The errors of one draw, for `inercal.estimate.coverage`."""
+    """The errors of one draw, for `inercal.foundation.estimate.coverage`."""
     truth, estimate = drawn(method, rng)
     return {
         "error": estimate.values - truth,

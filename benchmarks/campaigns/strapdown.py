@@ -11,13 +11,13 @@ sys.path.append(str(Path(__file__).parents[2] / "tests" / "strapdown"))
 import numpy as np
 from grades import GRADES, drawn
 
-from inercal.estimate.result import Estimate
-from inercal.records.record import record_of
-from inercal.strapdown.coefficients import stated
-from inercal.strapdown.settings import ESTIMABLE, StrapdownSettings
-from inercal.strapdown.simulate import simulated
-from inercal.strapdown.task import calibrate
-from inercal.units import parse_unit
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.records.record import record_of
+from inercal.foundation.units import parse_unit
+from inercal.systems.strapdown.coefficients import stated
+from inercal.systems.strapdown.settings import ESTIMABLE, StrapdownSettings
+from inercal.systems.strapdown.simulate import simulated
+from inercal.systems.strapdown.task import calibrate
 
 UNITS = {"acc": parse_unit("m/s^2"), "gyro": parse_unit("rad/s")}
 

@@ -13,11 +13,11 @@ import numpy as np
 from aoa_tunnels import STUDY, cases
 from independent.aoa import CASES, DEG, G, Run, Tunnel, simulate
 
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.simulate import to_record
-from inercal.aoa.task import measure
-from inercal.errors import InputError
-from inercal.geometry.site import Site
+from inercal.foundation.errors import InputError
+from inercal.foundation.geometry.site import Site
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.simulate import to_record
+from inercal.systems.aoa.task import measure
 
 from .fault import REFUSED, Fault, Outcome, late, said
 

@@ -11,10 +11,10 @@ import imu_faults
 import numpy as np
 from independent import imu
 
-from inercal.errors import InputError
-from inercal.imu.settings import ImuSettings
-from inercal.imu.task import calibrate
-from inercal.records.read import read
+from inercal.foundation.errors import InputError
+from inercal.foundation.records.read import read
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.task import calibrate
 
 from .fault import REFUSED, Fault, Outcome, compared
 

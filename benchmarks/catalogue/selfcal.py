@@ -12,7 +12,7 @@ import selfcal_faults
 from independent.selfcal import Faults, simulated, study
 
 import inercal as ic
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 from .fault import REFUSED, Fault, Outcome, compared
 

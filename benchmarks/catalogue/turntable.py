@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "independent"))
 import turntable_faults as of_table
 
 import inercal as ic
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from turntable import ARCSEC, Faults, recorded
 
 from .fault import REFUSED, Fault, Outcome, compared

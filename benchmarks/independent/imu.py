@@ -1,7 +1,7 @@
 """Recordings of an IMU in the hand or on a table, with the faults of laboratories: numpy alone, no code of inercal.
 
 Attitudes are rotation matrices in steps of a sample, made by the exponential series of the mean rate, in place of the
-quaternions of `inercal.imu.simulate`; numbers are in m/s^2 and rad/s, time in s.
+quaternions of `inercal.systems.imu.simulate`; numbers are in m/s^2 and rad/s, time in s.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A strapdown unit that rests and is turned by hand, with the faults of hands and laboratories: numpy alone.
 
 No code of inercal: rates are drawn first, attitudes are products of rotation matrices in steps of a tenth of a sample,
-and outputs are sums over these, where `inercal.strapdown.simulate` has closed forms of angles and Gauss's quadrature.
-n is east-north-up, numbers are in SI.
+and outputs are sums over these, where `inercal.systems.strapdown.simulate` has closed forms of angles and Gauss's
+quadrature. n is east-north-up, numbers are in SI.
 """
 
 from __future__ import annotations

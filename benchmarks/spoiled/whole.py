@@ -40,8 +40,8 @@ def text(delimiter=",", mark="."):
 @cache
 def written(suffix):
     """The record as inercal writes it."""
-    from inercal.records.read import read
-    from inercal.records.write import write_record
+    from inercal.foundation.records.read import read
+    from inercal.foundation.records.write import write_record
 
     with tempfile.TemporaryDirectory() as folder:
         source, path = Path(folder, "a.csv"), Path(folder, f"b{suffix}")
@@ -194,9 +194,9 @@ def bag(kind):
 
 def estimate():
     """A result with a covariance."""
-    from inercal.estimate.basis import Basis
-    from inercal.estimate.result import Estimate
-    from inercal.findings import Status
+    from inercal.foundation.estimate.basis import Basis
+    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.findings import Status
 
     none = Estimate.without(Basis("test"), Status.OK, "sound")
     from dataclasses import replace
@@ -210,7 +210,7 @@ def estimate():
 
 def result(suffix):
     """A result as a file."""
-    from inercal.estimate.files import save
+    from inercal.foundation.estimate.files import save
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"a{suffix}")
@@ -244,7 +244,7 @@ def certificate():
 
 def checkpoint():
     """The state of a stream."""
-    from inercal.estimate.checkpoint import save
+    from inercal.foundation.estimate.checkpoint import save
 
     with tempfile.TemporaryDirectory() as folder:
         save(Path(folder, "a"), "test", "same", {"x": VALUES["acc_x"], "n": 3})

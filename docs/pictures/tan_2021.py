@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.aoa.layout import Layout, axes, centrifugal_arms, tangential_arms
-from inercal.aoa.paper import lever, residuals, static
-from inercal.report.style import COLOURS, QUIET, WIDTH, envelope, few_powers, figure, svg
-from inercal.units import STANDARD_GRAVITY as G
+from inercal.faces.report.style import COLOURS, QUIET, WIDTH, envelope, few_powers, figure, svg
+from inercal.foundation.units import STANDARD_GRAVITY as G
+from inercal.systems.aoa.layout import Layout, axes, centrifugal_arms, tangential_arms
+from inercal.systems.aoa.paper import lever, residuals, static
 
 DEG = np.pi / 180.0
 DA, DW = 1e-4 * G, 0.2 * DEG

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.rigs.distribution import uniform
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import averages, exact
-from inercal.turntable.figures.sensitivity import maps, mean_indices
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import averages, exact
+from inercal.systems.turntable.figures.sensitivity import maps, mean_indices
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
 chain = turntable("two_axis_turntable", uniform(np.radians(2.0 / 60.0)))

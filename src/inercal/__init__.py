@@ -17,27 +17,29 @@ Frames, signs, units
 Instruments, forward: truth to indication
     triad          y = S M x + b: S scale factors, M unit-diagonal misalignment, b the output at zero input
     accelerometers K1_i, M_ij, K0_i; gyro S_i, T_ij, D_F_i and g-sensitive drift G_ij
-    by table angle K2_i, K3_i, cross terms; gyrowheels k_i, DX_F, DX_X .. DX_YZ (`inercal.instruments.by_angle`)
+    by table angle K2_i, K3_i, cross terms; gyrowheels k_i, DX_F, DX_X .. DX_YZ
+    (`inercal.foundation.instruments.by_angle`)
 
-Rigs: chains of joints, fixed transforms and elementary errors, base first (`inercal.rigs.chain.Chain`)
+Rigs: chains of joints, fixed transforms and elementary errors, base first (`inercal.foundation.rigs.chain.Chain`)
     turntables     n is north, west, up; C_nb = M_1 M_2 ... M_m; a = [0 0 -1] C_nb, omega = earth rate C_nb
     errors         dphi positioning, dalpha wobble, deps perpendicularity, dtheta mounting, dbase levelling, azimuth;
                    scope sample, position, run or rig: how long a value lasts
 
     gimbals        th_x outer, th_y inner, th_z platform; frame b of the encoders, p of the platform; q_bp(th);
-                   at zero angles p lies along north-up-east (or as the study says); `inercal.selfcal.platform.rig`
+                   at zero angles p lies along north-up-east (or as the study says);
+                   `inercal.systems.selfcal.platform.rig`
 
-Self-calibration: what a platform finds out about itself (`inercal.selfcal.platform.coefficients`)
+Self-calibration: what a platform finds out about itself (`inercal.systems.selfcal.platform.coefficients`)
     rate           w_Ip^p = w_c + M w_c + kg0, M from ds, do (kg1); w_c commanded, kg0 gyro bias
     accelerometers ka0 bias, ka1 scale error, eta misalignments pz, oy, oz; beta base against encoders
 
-Angle of attack: a model on a sting in a wind tunnel (`inercal.aoa.fusion.model`)
+Angle of attack: a model on a sting in a wind tunnel (`inercal.systems.aoa.fusion.model`)
     body           x forward, y left, z up, about the pivot; theta nose-up pitch, w = theta', phi roll right wing down
     accelerometer  at (r, 0, z), lambda from +x towards -z: reads g sin(theta - lambda) at rest; gyro nose-up positive
     errors         b_i, b_g biases; dr_i, zo_i of the positions; k_g gyro scale; tau_g gyro delay
-    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.aoa.angles`)
+    alpha, beta    of the flow: theta only without roll, yaw and flow angularity (`inercal.systems.aoa.angles`)
 
-Records: labelled columns (`inercal.records.record.Record`)
+Records: labelled columns (`inercal.foundation.records.record.Record`)
     IMU            t, acc_x acc_y acc_z, gyro_x gyro_y gyro_z, temperature
     turntable      position or t, phi1 phi2 (phi3), y_x y_y or the IMU's; rate in a rate test
     selfcal        t, wc_x.. or gyro_x.., th_x.., acc_x..; q_ref_0.. the true attitude
@@ -45,7 +47,7 @@ Records: labelled columns (`inercal.records.record.Record`)
 
 Uncertainty
     u standard, U = k u expanded for 95.45 % (k from Student's t), type A from scatter, type B from elsewhere;
-    an `inercal.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
+    an `inercal.foundation.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
 
 Map, lower floors first; each imports only from those above its own line
     addresses, arrays,         addresses without secrets; the type of arrays; what goes wrong; files that a result
@@ -87,28 +89,28 @@ Map, lower floors first; each imports only from those above its own line
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from inercal.errors import CalibrationError as CalibrationError
-    from inercal.errors import InputError as InputError
-    from inercal.estimate.result import Estimate as Estimate
-    from inercal.face.calibrations import apply as apply
-    from inercal.face.calibrations import compare as compare
-    from inercal.face.calibrations import load as load
-    from inercal.face.laboratory import history as history
-    from inercal.face.laboratory import keep as keep
-    from inercal.face.noise import allan as allan
-    from inercal.face.recordings import read as read
-    from inercal.face.recordings import record as record
-    from inercal.face.result import Result as Result
-    from inercal.face.study import Study as Study
-    from inercal.face.study import study as study
-    from inercal.face.verbs import calibrate as calibrate
-    from inercal.face.verbs import design as design
-    from inercal.face.verbs import runs as runs
-    from inercal.face.verbs import sensitivity as sensitivity
-    from inercal.face.verbs import simulate as simulate
-    from inercal.face.verbs import temperature as temperature
-    from inercal.fleet.batch import batch as batch
-    from inercal.records.record import Record as Record
+    from inercal.faces.python.calibrations import apply as apply
+    from inercal.faces.python.calibrations import compare as compare
+    from inercal.faces.python.calibrations import load as load
+    from inercal.faces.python.laboratory import history as history
+    from inercal.faces.python.laboratory import keep as keep
+    from inercal.faces.python.noise import allan as allan
+    from inercal.faces.python.recordings import read as read
+    from inercal.faces.python.recordings import record as record
+    from inercal.faces.python.result import Result as Result
+    from inercal.faces.python.study import Study as Study
+    from inercal.faces.python.study import study as study
+    from inercal.faces.python.verbs import calibrate as calibrate
+    from inercal.faces.python.verbs import design as design
+    from inercal.faces.python.verbs import runs as runs
+    from inercal.faces.python.verbs import sensitivity as sensitivity
+    from inercal.faces.python.verbs import simulate as simulate
+    from inercal.faces.python.verbs import temperature as temperature
+    from inercal.foundation.errors import CalibrationError as CalibrationError
+    from inercal.foundation.errors import InputError as InputError
+    from inercal.foundation.estimate.result import Estimate as Estimate
+    from inercal.foundation.records.record import Record as Record
+    from inercal.laboratory.fleet.batch import batch as batch
 
 __version__ = "0.2.0"
 

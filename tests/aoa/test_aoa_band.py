@@ -7,14 +7,14 @@ import pytest
 from independent.aoa import DEG, Tunnel, simulate
 from sting_study import study
 
-from inercal.aoa.band import Band
-from inercal.aoa.diagnosis.choice import of_delay, of_vibration
-from inercal.aoa.fusion import band
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.paper.delay import relative_delay
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Estimator
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.diagnosis.choice import of_delay, of_vibration
+from inercal.systems.aoa.fusion import band
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.paper.delay import relative_delay
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.settings import Estimator
 
 RATE = 500.0
 LIMITED = Band(35.0, (120.0,), RATE)

@@ -8,20 +8,20 @@ import sys
 import numpy as np
 import pytest
 
-import inercal.aoa
+import inercal.systems.aoa
 
 RUN = """
 import json
 from dataclasses import replace
 import numpy as np
 from sting_study import BASE, DEG, study
-from inercal.aoa.fusion import loop
-from inercal.aoa.fusion import smoother
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.settings import Timing
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.fusion import loop
+from inercal.systems.aoa.fusion import smoother
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.settings import Timing
+from inercal.systems.aoa.simulate import simulate
 
 found = {}
 for states in (8, 19):
@@ -45,7 +45,7 @@ print(json.dumps({"found": found, "missed": missed, "types": types}))
 
 def ran(**environment):
     """What a new process finds on a tenth of a second with the filter and the smoother."""
-    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.aoa.__file__)))
+    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.systems.aoa.__file__)))
     studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
     done = subprocess.run(
         [sys.executable, "-c", RUN],

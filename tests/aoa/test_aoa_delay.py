@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, scenario, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.layout import Layout
-from inercal.aoa.paper.delay import aligned, relative_delay
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.paper.delay import aligned, relative_delay
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.simulate import simulate
 
 LATE = Disturbances(gyro_delay=2e-3)
 

@@ -9,16 +9,16 @@ import pytest
 from sting_study import BASE, DEG, NOISE, G, layout, study
 
 import inercal as ic
-from inercal.aoa.design import compare, courses_of, sample_bound, settled_u, undisturbed
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import axes, tangential_arms
-from inercal.aoa.paper.residuals import error_terms
-from inercal.aoa.settings import Goal, Noise, Prior
-from inercal.aoa.simulate import drawn_biases, simulate
 from inercal.cli import run
-from inercal.errors import StudyError
-from inercal.face.study import read_study
+from inercal.faces.python.study import read_study
+from inercal.foundation.errors import StudyError
+from inercal.systems.aoa.design import compare, courses_of, sample_bound, settled_u, undisturbed
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.layout import axes, tangential_arms
+from inercal.systems.aoa.paper.residuals import error_terms
+from inercal.systems.aoa.settings import Goal, Noise, Prior
+from inercal.systems.aoa.simulate import drawn_biases, simulate
 from rows import for_each
 
 TINY = 1e-15

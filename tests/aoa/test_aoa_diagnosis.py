@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario, study
 
-from inercal.aoa.diagnosis.examination import diagnose
-from inercal.aoa.diagnosis.fit_quality import fit_quality
-from inercal.aoa.diagnosis.noise_check import scatter
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Estimator, MotionPlan
-from inercal.aoa.simulate import simulate
-from inercal.findings import EVERYTHING
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.findings import EVERYTHING
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.diagnosis.examination import diagnose
+from inercal.systems.aoa.diagnosis.fit_quality import fit_quality
+from inercal.systems.aoa.diagnosis.noise_check import scatter
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.settings import Estimator, MotionPlan
+from inercal.systems.aoa.simulate import simulate
 
 SWEEP = study(motion=MotionPlan("static", duration=3.0, first=-10.0 * DEG, last=60.0 * DEG))
 SHORT = study(motion=replace(BASE, duration=4.0))

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, study
 
-from inercal.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Plunge, Shaking
-from inercal.aoa.settings import MotionPlan, Noise
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
-from inercal.errors import InputError
-from inercal.findings import Status
-from inercal.records.read import read
-from inercal.records.write import write_record
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import Status
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Plunge, Shaking
+from inercal.systems.aoa.settings import MotionPlan, Noise
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 FS = 1000.0
 NONE = Noise(1e-12, 1e-12, 1e-12, 1e-12)

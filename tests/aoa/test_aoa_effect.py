@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from sting_study import NOISE, G, scenario, study
 
-from inercal.aoa.diagnosis.effect import effect, of_flexure
-from inercal.aoa.diagnosis.examination import diagnose
-from inercal.aoa.disturbances import Disturbances, Shaking
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.settings import MotionPlan, Prior
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.diagnosis.effect import effect, of_flexure
+from inercal.systems.aoa.diagnosis.examination import diagnose
+from inercal.systems.aoa.disturbances import Disturbances, Shaking
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.settings import MotionPlan, Prior
+from inercal.systems.aoa.simulate import simulate
 
 
 def flexure_said(settings):

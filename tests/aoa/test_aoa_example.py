@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from inercal.aoa.simulate import simulate, to_record
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.records.read import read
-from inercal.studies.load import load_aoa_study
+from inercal.faces.studies.load import load_aoa_study
+from inercal.foundation.records.read import read
+from inercal.systems.aoa.simulate import simulate, to_record
 
 EXAMPLE = EXAMPLES["sting"]
 LAST = {"a1": 1e-5, "a2": 1e-5, "a3": 1e-5, "gyro": 1e-2, "point": 1.0}

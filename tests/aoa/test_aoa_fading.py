@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, NOISE, G, study
 
-from inercal.aoa.fusion import run
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.live import Live
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.fusion import run
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.live import Live
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.simulate import simulate
 
 SLOW = replace(BASE, duration=700.0, sample_rate=20.0, frequency=0.2)
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario
 
-from inercal.aoa.band import Band
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.figures import page as page_of
-from inercal.aoa.figures import pictures, sensors
-from inercal.aoa.figures.learned import consistency
-from inercal.aoa.settings import Attitude
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
-from inercal.report.over_time import Marks, Signals, gaps, measured, over_time, stretches, thinned
-from inercal.report.spectra import of_angle, peak, spectral_density
-from inercal.units import Quantity, parse_unit
+from inercal.faces.report.over_time import Marks, Signals, gaps, measured, over_time, stretches, thinned
+from inercal.faces.report.spectra import of_angle, peak, spectral_density
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.figures import page as page_of
+from inercal.systems.aoa.figures import pictures, sensors
+from inercal.systems.aoa.figures.learned import consistency
+from inercal.systems.aoa.settings import Attitude
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 
 def words_of(svg):

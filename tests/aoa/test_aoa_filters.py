@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.ndimage import median_filter
 from scipy.signal import butter, iirnotch, sosfilt, sosfilt_zi, welch
 
-from inercal.aoa.band import Band
-from inercal.aoa.diagnosis.spectrum import _running_median, powers
-from inercal.aoa.fusion.band import filter_of
-from inercal.aoa.limits import LIMITS
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.diagnosis.spectrum import _running_median, powers
+from inercal.systems.aoa.fusion.band import filter_of
+from inercal.systems.aoa.limits import LIMITS
 
 
 @settings(max_examples=30, deadline=None)

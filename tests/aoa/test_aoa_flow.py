@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
-from inercal.aoa.angles import alpha_beta, gives_alpha, theta_by_roll
-from inercal.aoa.settings import Attitude
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.angles import alpha_beta, gives_alpha, theta_by_roll
+from inercal.systems.aoa.settings import Attitude
 from rows import for_each
 
 DEG = math.pi / 180.0

@@ -12,18 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import BASE, DEG, NOISE, G, scenario, study
 
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.fusion import smoother
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.loop import OUTPUTS
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.fusion.run import advance, initial
-from inercal.aoa.layout import Layout
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Attitude, Estimator, MotionPlan, Prior, Resonance, Timing
-from inercal.aoa.simulate import simulate
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.fusion import smoother
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.loop import OUTPUTS
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.fusion.run import advance, initial
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.settings import Attitude, Estimator, MotionPlan, Prior, Resonance, Timing
+from inercal.systems.aoa.simulate import simulate
 
 ROLLED = Attitude(roll=Quantity(0.5, 1e-3, parse_unit("rad"), ""))
 COUPLED = Disturbances(yaw=Oscillation(1.0 * DEG, 8.0), roll=Oscillation(2.0 * DEG, 3.0))

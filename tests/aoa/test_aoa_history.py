@@ -10,18 +10,18 @@ import pytest
 from scipy.io import netcdf_file
 from sting_study import DEG, study
 
-from inercal.aoa.alarm import Alarm
-from inercal.aoa.angles import Angles, stated_roll
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.result.alarms import beyond_limits
-from inercal.aoa.result.columns import angles_record, columns, points_record, rows
-from inercal.aoa.result.points import points
-from inercal.aoa.result.systematic import by_fusion, by_methods
-from inercal.aoa.settings import Attitude, Methods, MotionPlan
-from inercal.aoa.simulate import simulate
-from inercal.records.write import SUFFIXES, write_record
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.records.write import SUFFIXES, write_record
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.angles import Angles, stated_roll
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.result.alarms import beyond_limits
+from inercal.systems.aoa.result.columns import angles_record, columns, points_record, rows
+from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.result.systematic import by_fusion, by_methods
+from inercal.systems.aoa.settings import Attitude, Methods, MotionPlan
+from inercal.systems.aoa.simulate import simulate
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0

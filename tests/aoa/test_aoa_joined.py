@@ -9,15 +9,15 @@ from sting_study import DEG, study
 from test_aoa_points import angles, recording
 from test_aoa_runs import STUDY
 
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.reading.triggers import triggered
-from inercal.aoa.result.balance import clock_offset, join, read_balance
-from inercal.aoa.result.points import points
-from inercal.aoa.settings import MotionPlan, PointPlan
-from inercal.aoa.simulate import simulate, to_record
 from inercal.cli import run
-from inercal.errors import InputError, RecordError
-from inercal.records.write import write_record
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.reading.triggers import triggered
+from inercal.systems.aoa.result.balance import clock_offset, join, read_balance
+from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.settings import MotionPlan, PointPlan
+from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each
 
 T = np.arange(1000) / 100.0

@@ -10,14 +10,14 @@ import pytest
 from new_studies import FILL
 from sting_study import BASE, layout, scenario, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.paper.delay import relative_delay
-from inercal.aoa.paper.frequency import oscillation_frequency
-from inercal.aoa.paper.lever import zero_phase
-from inercal.aoa.reading.clock import shortened, usual_step
-from inercal.aoa.simulate import simulate, to_record
 from inercal.cli import run
-from inercal.records.write import write_record
+from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.paper.delay import relative_delay
+from inercal.systems.aoa.paper.frequency import oscillation_frequency
+from inercal.systems.aoa.paper.lever import zero_phase
+from inercal.systems.aoa.reading.clock import shortened, usual_step
+from inercal.systems.aoa.simulate import simulate, to_record
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="limits of memory as on POSIX")
 JUMPS = [1e6, 1.7e9]

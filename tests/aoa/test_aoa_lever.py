@@ -8,16 +8,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sting_study import DEG, NOISE, G, layout, study
 
-from inercal.aoa.fusion import model
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import Layout, all_weights, axes, centrifugal_arms, pair_weights, tangential_arms
-from inercal.aoa.paper import residuals
-from inercal.aoa.paper.lever import centrifugal, differentiated, dual, peak_rate
-from inercal.aoa.paper.static import angle as angle_of
-from inercal.aoa.settings import Attitude
-from inercal.errors import StudyError
-from inercal.estimate.kalman import empty_row
-from inercal.units import parse_quantity
+from inercal.foundation.errors import StudyError
+from inercal.foundation.estimate.kalman import empty_row
+from inercal.foundation.units import parse_quantity
+from inercal.systems.aoa.fusion import model
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.layout import (
+    Layout,
+    all_weights,
+    axes,
+    centrifugal_arms,
+    pair_weights,
+    tangential_arms,
+)
+from inercal.systems.aoa.paper import residuals
+from inercal.systems.aoa.paper.lever import centrifugal, differentiated, dual, peak_rate
+from inercal.systems.aoa.paper.static import angle as angle_of
+from inercal.systems.aoa.settings import Attitude
 
 DA, DW, L = 1e-4 * G, 0.2 * DEG, 0.5
 THREE = layout()

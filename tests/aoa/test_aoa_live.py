@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from sting_study import BASE, DEG, G, study
 
-from inercal.aoa.fusion import run as fusion
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.live import Answers, Live, LiveState
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.reading.recording import Recording
-from inercal.aoa.settings import Attitude
-from inercal.aoa.simulate import simulate
-from inercal.errors import RecordError
-from inercal.estimate.checkpoint import load, save
-from inercal.units import parse_quantity
+from inercal.foundation.errors import RecordError
+from inercal.foundation.estimate.checkpoint import load, save
+from inercal.foundation.units import parse_quantity
+from inercal.systems.aoa.fusion import run as fusion
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.live import Answers, Live, LiveState
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.settings import Attitude
+from inercal.systems.aoa.simulate import simulate
 
 ROWS = 400
 

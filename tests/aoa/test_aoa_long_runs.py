@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, study
 
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import Layout
-from inercal.aoa.settings import MotionPlan
-from inercal.aoa.simulate import drawn_biases, simulate
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.settings import MotionPlan
+from inercal.systems.aoa.simulate import drawn_biases, simulate
 
 REST = MotionPlan("static", duration=120.0, sample_rate=100.0, first=20.0 * DEG, last=20.0 * DEG)
 BUFFET = MotionPlan("buffet", duration=40.0, mean=45.0 * DEG, rms=0.2 * DEG, low=2.0, high=15.0)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, SCENARIOS, clipped, scenario, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.estimators import STATICS
-from inercal.aoa.paper.methods import MEASURED, label, low_passed, measure
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Attitude, Methods, Prior, Timing
-from inercal.aoa.simulate import drawn_biases, simulate
-from inercal.errors import RecordError, StudyError
-from inercal.units import parse_quantity
+from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.units import parse_quantity
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.estimators import STATICS
+from inercal.systems.aoa.paper.methods import MEASURED, label, low_passed, measure
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.settings import Attitude, Methods, Prior, Timing
+from inercal.systems.aoa.simulate import drawn_biases, simulate
 from rows import for_each
 
 PAPER = Methods()

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from sting_study import DEG, G, study
 
-from inercal.aoa.fusion import model
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.settings import Attitude, Timing
-from inercal.estimate.kalman import empty_row
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.estimate.kalman import empty_row
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.fusion import model
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.settings import Attitude, Timing
 
 pytestmark = pytest.mark.kernels
 

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, scenario, study
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reading.wind_off_zero import with_zero
-from inercal.aoa.result.budget import parts
-from inercal.aoa.result.outcome import assemble, assemble_angles
-from inercal.aoa.result.systematic import by_fusion, by_methods
-from inercal.aoa.result.verification import errors
-from inercal.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
-from inercal.aoa.simulate import simulate
-from inercal.estimate.files import from_json, to_json
-from inercal.findings import Finding, Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.estimate.files import from_json, to_json
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.angles import Angles
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.reading.wind_off_zero import with_zero
+from inercal.systems.aoa.result.budget import parts
+from inercal.systems.aoa.result.outcome import assemble, assemble_angles
+from inercal.systems.aoa.result.systematic import by_fusion, by_methods
+from inercal.systems.aoa.result.verification import errors
+from inercal.systems.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
+from inercal.systems.aoa.simulate import simulate
 
 UNCERTAIN = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))
 SINE = MotionPlan("sine", duration=6.0, mean=30.0 * DEG, amplitude=10.0 * DEG, frequency=1.0)
@@ -83,7 +83,9 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
     made = simulate(settings, np.random.default_rng(1)).recording
     made.zero_angle[2500] = made.reference[2500], 0.02 * DEG
     found = []
-    monkeypatch.setattr("inercal.aoa.result.budget._items", lambda parts, names: found.extend(parts) or ())
+    monkeypatch.setattr(
+        "inercal.systems.aoa.result.budget._items", lambda parts, names: found.extend(parts) or ()
+    )
     parts(made, of := problem(settings), settings, smoothed, np.full(len(made.t), True))
     whole = np.sum([part for _, part in found], axis=0)
     told = estimate(made, of, smoothed)
@@ -102,7 +104,7 @@ def test_parts_of_the_variance_add_up_to_it(smoothed, monkeypatch):
 @pytest.mark.parametrize("smooth", [False, True])
 def test_the_budget_of_sensors_that_come_late_is_that_of_the_record_from_there_on(smooth, monkeypatch):
     """Rows without accelerometers, more than are looked at, tell of no angle: they split nothing."""
-    monkeypatch.setattr("inercal.aoa.result.budget.MOST", 600)
+    monkeypatch.setattr("inercal.systems.aoa.result.budget.MOST", 600)
     settings = study(
         motion=replace(SINE, sample_rate=250.0), estimator=Estimator(19, smooth=smooth), site=UNCERTAIN
     )

@@ -6,12 +6,12 @@ import weakref
 import numpy as np
 from sting_study import DEG
 
-from inercal.aoa.angles import unwrapped
-from inercal.aoa.paper.delay import _moved
-from inercal.aoa.reading import clock, pauses
-from inercal.aoa.reading.clock import in_time, later
-from inercal.aoa.reading.recording import plain
-from inercal.arrays import remembered
+from inercal.foundation.arrays import remembered
+from inercal.systems.aoa.angles import unwrapped
+from inercal.systems.aoa.paper.delay import _moved
+from inercal.systems.aoa.reading import clock, pauses
+from inercal.systems.aoa.reading.clock import in_time, later
+from inercal.systems.aoa.reading.recording import plain
 from rows import for_each
 
 

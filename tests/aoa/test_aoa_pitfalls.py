@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, clipped, scenario, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.fusion import loop, model
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.fusion.run import advance, initial
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.settings import Estimator, MotionPlan, Noise, Prior, Resonance
-from inercal.aoa.simulate import simulate
-from inercal.errors import RecordError
-from inercal.estimate.kalman import empty_row
+from inercal.foundation.errors import RecordError
+from inercal.foundation.estimate.kalman import empty_row
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.fusion import loop, model
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.fusion.run import advance, initial
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.settings import Estimator, MotionPlan, Noise, Prior, Resonance
+from inercal.systems.aoa.simulate import simulate
 
 
 def told(found, simulated, after):

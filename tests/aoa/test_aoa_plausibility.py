@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, SCENARIOS, G, clipped, scenario, study
 
-from inercal.aoa.diagnosis.examination import diagnose, implausible
-from inercal.aoa.diagnosis.gross import gross_faults
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.filter_result import of_fusion as of_filter
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.result.verdict import of_fusion
-from inercal.aoa.settings import MotionPlan, Timing
-from inercal.aoa.simulate import simulate
-from inercal.findings import Status
+from inercal.foundation.findings import Status
+from inercal.systems.aoa.diagnosis.examination import diagnose, implausible
+from inercal.systems.aoa.diagnosis.gross import gross_faults
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.filter_result import of_fusion as of_filter
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.result.verdict import of_fusion
+from inercal.systems.aoa.settings import MotionPlan, Timing
+from inercal.systems.aoa.simulate import simulate
 
 SHORT = study(motion=replace(BASE, duration=1.6))
 REST = study(motion=MotionPlan("static", duration=1.6, first=10.0 * DEG, last=10.0 * DEG))

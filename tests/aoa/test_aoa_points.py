@@ -8,17 +8,17 @@ import pytest
 from scipy.signal import lfilter
 from sting_study import BASE, DEG, SCENARIOS, scenario, study
 
-from inercal.aoa.angles import Angles, stated_roll, theta_by_roll
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.motion import Sines, buffet
-from inercal.aoa.reading.means import COSINES, mean_u
-from inercal.aoa.reading.pauses import at_rest, pauses
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.result.points import points
-from inercal.aoa.settings import Attitude, MotionPlan
-from inercal.aoa.simulate import simulate
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.angles import Angles, stated_roll, theta_by_roll
+from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import Sines, buffet
+from inercal.systems.aoa.reading.means import COSINES, mean_u
+from inercal.systems.aoa.reading.pauses import at_rest, pauses
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.settings import Attitude, MotionPlan
+from inercal.systems.aoa.simulate import simulate
 from rows import for_each
 
 DRAWS = 600

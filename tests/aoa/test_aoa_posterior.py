@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, G, study
 
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.layout import Layout
-from inercal.aoa.reference.corrections import corrected as put_right
-from inercal.aoa.reference.sensor_fit import fit
-from inercal.aoa.result.carry_over import corrected, load
-from inercal.aoa.result.outcome import assemble, assemble_angles
-from inercal.aoa.settings import Calibration, MotionPlan
-from inercal.aoa.simulate import drawn_biases, simulate
-from inercal.errors import InputError, StudyError
-from inercal.estimate.basis import Basis
-from inercal.estimate.files import save
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
+from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.files import save
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.reference.corrections import corrected as put_right
+from inercal.systems.aoa.reference.sensor_fit import fit
+from inercal.systems.aoa.result.carry_over import corrected, load
+from inercal.systems.aoa.result.outcome import assemble, assemble_angles
+from inercal.systems.aoa.settings import Calibration, MotionPlan
+from inercal.systems.aoa.simulate import drawn_biases, simulate
 from rows import for_each
 
 SWEEP = MotionPlan("pitch-pause", first=-10.0 * DEG, last=90.0 * DEG, step=20.0 * DEG, move=1.0, pause=1.0)

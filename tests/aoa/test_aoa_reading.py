@@ -9,16 +9,16 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 from sting_study import BASE, DEG, G, study
 
-from inercal.aoa.reading.from_record import of_sensors, recording_of
-from inercal.aoa.settings import Calibration
-from inercal.aoa.simulate import simulate
-from inercal.errors import RecordError
-from inercal.geometry.rotations import principal
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.foundation.errors import RecordError
+from inercal.foundation.geometry.rotations import principal
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.aoa.reading.from_record import of_sensors, recording_of
+from inercal.systems.aoa.settings import Calibration
+from inercal.systems.aoa.simulate import simulate
 
 SHORT = study(motion=replace(BASE, duration=2.0))
 TRUE = simulate(SHORT, np.random.default_rng(1)).recording

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from sting_study import DEG, SCENARIOS, G, scenario
 
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.motion import buffet, course, duration
-from inercal.aoa.reading.from_record import recording_of
-from inercal.aoa.settings import Calibration, MotionPlan
-from inercal.aoa.simulate import simulate, to_record
-from inercal.errors import StudyError
-from inercal.records.read import read
-from inercal.records.write import write_record
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.errors import StudyError
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.motion import buffet, course, duration
+from inercal.systems.aoa.reading.from_record import recording_of
+from inercal.systems.aoa.settings import Calibration, MotionPlan
+from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each
 
 #: sensors in volts and counts, with biases and temperature terms

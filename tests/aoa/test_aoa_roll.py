@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, study
 
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.fusion import filter_result
-from inercal.aoa.fusion.filter_result import estimate, of_fusion, tracked_roll
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.result.points import points
-from inercal.aoa.result.systematic import by_fusion
-from inercal.aoa.settings import Attitude
-from inercal.aoa.simulate import simulate
-from inercal.units import Quantity, parse_unit
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.fusion import filter_result
+from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion, tracked_roll
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.result.systematic import by_fusion
+from inercal.systems.aoa.settings import Attitude
+from inercal.systems.aoa.simulate import simulate
 
 ROLL = Quantity(10.0 * DEG, 0.5 * DEG, parse_unit("rad"), "")
 COUPLED = Disturbances(roll=Oscillation(1.0 * DEG, 6.0), yaw=Oscillation(1.0 * DEG, 8.0))

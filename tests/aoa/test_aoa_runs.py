@@ -9,14 +9,14 @@ import pytest
 from sting_study import BASE, DEG, G, study
 
 import inercal as ic
-from inercal.aoa.runs.run_table import read_runs_table
-from inercal.aoa.runs.summary import error_terms
-from inercal.aoa.runs.tare import WindOff, interpolated
-from inercal.aoa.settings import MotionPlan
-from inercal.aoa.simulate import drawn_biases, simulate, to_record
 from inercal.cli import run
-from inercal.errors import InputError
-from inercal.records.write import write_record
+from inercal.foundation.errors import InputError
+from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.runs.run_table import read_runs_table
+from inercal.systems.aoa.runs.summary import error_terms
+from inercal.systems.aoa.runs.tare import WindOff, interpolated
+from inercal.systems.aoa.settings import MotionPlan
+from inercal.systems.aoa.simulate import drawn_biases, simulate, to_record
 from rows import for_each
 
 FS = 200.0

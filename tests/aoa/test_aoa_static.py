@@ -8,9 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from sting_study import DEG, G, layout
 
-from inercal.aoa.layout import Layout
-from inercal.aoa.paper.static import angle, bound, complementary, improved, segmented, spread
-from inercal.errors import StudyError
+from inercal.foundation.errors import StudyError
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.paper.static import angle, bound, complementary, improved, segmented, spread
 from rows import for_each
 
 DA = 1e-4 * G

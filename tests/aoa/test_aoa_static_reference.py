@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.reference.static_fit import at_rests_alone, static_fit
-from inercal.aoa.settings import MotionPlan
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
-from inercal.errors import RecordError
+from inercal.foundation.errors import RecordError
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.reference.static_fit import at_rests_alone, static_fit
+from inercal.systems.aoa.settings import MotionPlan
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 ANGLES = np.arange(-20.0, 45.0, 7.0) * DEG
 ROWS = 50

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, study
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reference.corrections import report_of
-from inercal.aoa.reference.sensor_fit import fit
-from inercal.aoa.result.carry_over import corrected
-from inercal.aoa.result.outcome import assemble, assemble_angles, term_of
-from inercal.aoa.result.points import points
-from inercal.aoa.result.tables import (
+from inercal.foundation.estimate.files import save, to_json
+from inercal.foundation.instruments.terms import shown_unit, sized
+from inercal.systems.aoa.angles import Angles
+from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.reference.corrections import report_of
+from inercal.systems.aoa.reference.sensor_fit import fit
+from inercal.systems.aoa.result.carry_over import corrected
+from inercal.systems.aoa.result.outcome import assemble, assemble_angles, term_of
+from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.result.tables import (
     angle,
     answer,
     delays,
@@ -32,11 +34,9 @@ from inercal.aoa.result.tables import (
     uncertainty,
     use_of_fit,
 )
-from inercal.aoa.result.verification import errors
-from inercal.aoa.settings import Calibration, MotionPlan, Timing
-from inercal.aoa.simulate import simulate
-from inercal.estimate.files import save, to_json
-from inercal.instruments.terms import shown_unit, sized
+from inercal.systems.aoa.result.verification import errors
+from inercal.systems.aoa.settings import Calibration, MotionPlan, Timing
+from inercal.systems.aoa.simulate import simulate
 
 PAUSES = MotionPlan(
     "pitch-pause", sample_rate=200.0, first=0.0, last=20.0 * DEG, step=10.0 * DEG, move=1.0, pause=2.0

@@ -8,20 +8,20 @@ import pytest
 from independent.aoa import CASES, DEG, LINES, G, Tunnel, simulate
 from sting_study import NOISE, study
 
-from inercal.aoa.band import Band
-from inercal.aoa.diagnosis.choice import decided, of_vibration
-from inercal.aoa.diagnosis.examination import diagnose, implausible
-from inercal.aoa.diagnosis.gyro_scale import alone
-from inercal.aoa.diagnosis.rectification import of_rectification
-from inercal.aoa.diagnosis.small import further_ahead, with_axis
-from inercal.aoa.diagnosis.unseen import unseen
-from inercal.aoa.fusion.filter_result import estimate, of_fusion
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.result.verification import late_reference
-from inercal.aoa.settings import Estimator, Prior, Resonance
-from inercal.stream.aoa_state import choice_of, chosen
-from inercal.units import STANDARD_GRAVITY
+from inercal.faces.stream.aoa_state import choice_of, chosen
+from inercal.foundation.units import STANDARD_GRAVITY
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.diagnosis.choice import decided, of_vibration
+from inercal.systems.aoa.diagnosis.examination import diagnose, implausible
+from inercal.systems.aoa.diagnosis.gyro_scale import alone
+from inercal.systems.aoa.diagnosis.rectification import of_rectification
+from inercal.systems.aoa.diagnosis.small import further_ahead, with_axis
+from inercal.systems.aoa.diagnosis.unseen import unseen
+from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.result.verification import late_reference
+from inercal.systems.aoa.settings import Estimator, Prior, Resonance
 
 SEEDS = 2
 BUFFETS = [name for name in CASES if name.startswith("buffet")]

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 from sting_study import BASE, G, study
 
-from inercal.aoa.fusion.loop import root, significant
-from inercal.aoa.limits import LIMITS
-from inercal.aoa.paper.methods import measure as by_method
-from inercal.aoa.reading.pauses import at_rest
-from inercal.aoa.reference.sensor_fit import fit
-from inercal.aoa.result.verdict import is_covariance, nis_limit
-from inercal.aoa.settings import Methods
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
-from inercal.findings import Status
-from inercal.studies.aoa import aoa_study
+from inercal.faces.studies.aoa import aoa_study
+from inercal.foundation.findings import Status
+from inercal.systems.aoa.fusion.loop import root, significant
+from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.paper.methods import measure as by_method
+from inercal.systems.aoa.reading.pauses import at_rest
+from inercal.systems.aoa.reference.sensor_fit import fit
+from inercal.systems.aoa.result.verdict import is_covariance, nis_limit
+from inercal.systems.aoa.settings import Methods
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 
 def test_a_clock_that_stands_shows_no_motion():

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, layout, study
 
-from inercal.aoa.angles import Angles
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.reference.readings import reference
-from inercal.aoa.reference.sensor_fit import _linearised, fit, fit_terms
-from inercal.aoa.result.verification import errors
-from inercal.aoa.settings import MotionPlan
-from inercal.aoa.simulate import simulate
-from inercal.errors import RecordError
+from inercal.foundation.errors import RecordError
+from inercal.systems.aoa.angles import Angles
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.reference.readings import reference
+from inercal.systems.aoa.reference.sensor_fit import _linearised, fit, fit_terms
+from inercal.systems.aoa.result.verification import errors
+from inercal.systems.aoa.settings import MotionPlan
+from inercal.systems.aoa.simulate import simulate
 
 WIDE = MotionPlan(
     "two-tone",

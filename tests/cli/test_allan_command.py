@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.files import load
 from inercal.examples import FOLDER
-from inercal.instruments.noise import NoiseModel
-from inercal.validate.noise import ALLANTOOLS, TAU
+from inercal.faces.validate.noise import ALLANTOOLS, TAU
+from inercal.foundation.estimate.files import load
+from inercal.foundation.instruments.noise import NoiseModel
 from rows import for_each
 
 #: 0.1 deg/sqrt(h) and 50 ug/sqrt(Hz)

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from new_studies import FILL
 
-from inercal.aoa import settings
 from inercal.cli import aoa as command
 from inercal.cli import run
-from inercal.estimate.files import load
+from inercal.foundation.estimate.files import load
+from inercal.systems.aoa import settings
 from rows import for_each
 
 pytestmark = pytest.mark.usefixtures("undrawn")

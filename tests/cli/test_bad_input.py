@@ -12,8 +12,8 @@ from inercal.cli import run
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    from inercal.imu.simulate import draw_truth, hand_poses, simulate
-    from inercal.records.write import write_record
+    from inercal.foundation.records.write import write_record
+    from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
     path = tmp_path_factory.mktemp("spoiled")
     rng = np.random.default_rng(3)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.files import load, save
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
-from inercal.imu.task import calibrate
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.systems.imu.task import calibrate
 from rows import for_each
 
 

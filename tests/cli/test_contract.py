@@ -29,8 +29,8 @@ def inercal(*arguments: object, **options: object) -> subprocess.CompletedProces
 @pytest.fixture
 def simulated(tmp_path) -> Path:
     """A recording in canonical CSV, with its study."""
-    from inercal.imu.simulate import draw_truth, hand_poses, simulate
-    from inercal.records.write import write_record
+    from inercal.foundation.records.write import write_record
+    from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
     rng = np.random.default_rng(1)
     record, _ = simulate(draw_truth(rng), hand_poses(rng, 16), 9.81, 0.8, rng, rate=50.0)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.convert.correct import ImuModel
-from inercal.convert.other_tools import CONVENTIONS
-from inercal.estimate.files import load, save
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.instruments.triad import TriadModel
+from inercal.faces.convert.correct import ImuModel
+from inercal.faces.convert.other_tools import CONVENTIONS
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.triad import TriadModel
 from rows import for_each
 
 NAMES = (

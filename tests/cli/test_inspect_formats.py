@@ -9,11 +9,11 @@ from rosbags import rosbag2
 from rosbags.typesys import Stores, get_typestore
 
 from inercal.cli import run
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.records.write import SUFFIXES, write_record
-from inercal.units import parse_unit
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.records.write import SUFFIXES, write_record
+from inercal.foundation.units import parse_unit
 
 N = 500
 T = np.arange(N) / 100

@@ -15,13 +15,13 @@ from inercal.cli import run
 from inercal.cli.package import script
 from inercal.cli.tree import COMMANDS
 from inercal.examples import EXAMPLES
-from inercal.instruments.terms import term
-from inercal.studies.load import (
+from inercal.faces.studies.load import (
     load_aoa_study,
     load_imu_study,
     load_selfcal_study,
     load_strapdown_study,
 )
+from inercal.foundation.instruments.terms import term
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -154,7 +154,7 @@ def test_every_template_is_a_study_that_its_command_reads(kind, tmp_path):
     """Untouched, and under the JSON Schema that editors check by."""
     from jsonschema import Draft202012Validator
 
-    from inercal.studies.schema import json_schema
+    from inercal.faces.studies.schema import json_schema
 
     template, load = TEMPLATES[kind]
     path = tmp_path / f"{kind}.toml"
@@ -346,7 +346,7 @@ def test_a_kind_of_motion_that_is_set_takes_the_place_of_the_other(tmp_path):
 
 
 def test_a_missing_unit_gets_an_example_of_its_own_key(tmp_path):
-    from inercal.errors import StudyError
+    from inercal.foundation.errors import StudyError
 
     path = tmp_path / "selfcal.toml"
     path.write_text(filled("selfcal"), encoding="utf-8")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.estimate.files import load
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
-from inercal.records.write import write_record
+from inercal.foundation.estimate.files import load
+from inercal.foundation.records.write import write_record
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
 
 @pytest.fixture(scope="module")

@@ -16,10 +16,10 @@ from new_studies import FILL
 from paper_study import TRUTH
 
 from inercal.cli import run
-from inercal.estimate.files import load
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.platform.coefficients import NAMES
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.estimate.files import load
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.platform.coefficients import NAMES
 from rows import for_each
 
 pytestmark = pytest.mark.usefixtures("undrawn")

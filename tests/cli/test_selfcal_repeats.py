@@ -8,8 +8,8 @@ import pytest
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.selfcal.platform.coefficients import NAMES
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.systems.selfcal.platform.coefficients import NAMES
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

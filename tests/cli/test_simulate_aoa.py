@@ -8,11 +8,11 @@ import pytest
 from new_studies import FILL
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.aoa.reading.from_record import recording_of
-from inercal.aoa.simulate import simulate
 from inercal.cli import run
-from inercal.records.read import read
-from inercal.studies.load import load_aoa_study
+from inercal.faces.studies.load import load_aoa_study
+from inercal.foundation.records.read import read
+from inercal.systems.aoa.reading.from_record import recording_of
+from inercal.systems.aoa.simulate import simulate
 from rows import for_each
 
 SHORT = ["--set", "motion.duration=2 s", "--set", "site.latitude=40 deg"]

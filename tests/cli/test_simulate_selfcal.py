@@ -12,12 +12,12 @@ from paper_study import TRUTH
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.records.read import read
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.platform.coefficients import NAMES
-from inercal.selfcal.platform.plan import path
-from inercal.selfcal.reading import recording_of
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.records.read import read
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.platform.coefficients import NAMES
+from inercal.systems.selfcal.platform.plan import path
+from inercal.systems.selfcal.reading import recording_of
 
 SHORT = [
     "--set", 'plan.turns=[["z", "30 deg"], ["x", "20 deg", "2 deg/s"], ["rest", "4 s"]]',

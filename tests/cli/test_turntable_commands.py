@@ -10,7 +10,7 @@ import xarray
 from new_studies import FILL
 
 from inercal.cli import run
-from inercal.rigs.plans import named
+from inercal.foundation.rigs.plans import named
 from rows import for_each
 
 pytestmark = pytest.mark.usefixtures("undrawn")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.records.read import read
-from inercal.records.write import SUFFIXES
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import SUFFIXES
 
 STUDY = """
 [site]

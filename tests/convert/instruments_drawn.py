@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from inercal.convert.correct import ImuModel
-from inercal.convert.other_tools import CONVENTIONS
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.instruments.triad import TriadModel
-from inercal.units import parse_unit
+from inercal.faces.convert.correct import ImuModel
+from inercal.faces.convert.other_tools import CONVENTIONS
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.triad import TriadModel
+from inercal.foundation.units import parse_unit
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -43,7 +43,7 @@ def corrected(model: ImuModel, motion: tuple[np.ndarray, np.ndarray], units: dic
 
 def there_and_back(model: ImuModel, name: str) -> ImuModel:
     """Through the text of another tool's files, as a program that knows nothing else would."""
-    from inercal.convert.convention import in_si_outputs
+    from inercal.faces.convert.convention import in_si_outputs
 
     convention = CONVENTIONS[name]
     given = in_si_outputs(model) if convention.si else model
@@ -63,7 +63,7 @@ def assert_same_corrections(model: ImuModel, other: ImuModel, seed: int) -> None
 
 def estimate_of(model: ImuModel, rng: np.random.Generator, relative_u: float = 1e-5) -> Estimate:
     """A calibration that says the model, with a full random covariance."""
-    from inercal.convert.other_tools import coefficients
+    from inercal.faces.convert.other_tools import coefficients
 
     values = coefficients(model)
     x = np.array(list(values.values()))

@@ -7,17 +7,17 @@ from scipy.spatial.transform import Rotation
 
 import inercal as ic
 from inercal.cli import run
-from inercal.convert.correction import apply_to
-from inercal.convert.platform import not_applied, platform_model
-from inercal.errors import InputError
-from inercal.estimate.files import save
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.records.record import record_of
-from inercal.records.write import write_record
-from inercal.selfcal.platform.coefficients import NAMES, units
-from inercal.selfcal.platform.states import ALL
-from inercal.units import parse_unit
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.platform import not_applied, platform_model
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.records.record import record_of
+from inercal.foundation.records.write import write_record
+from inercal.foundation.units import parse_unit
+from inercal.systems.selfcal.platform.coefficients import NAMES, units
+from inercal.systems.selfcal.platform.states import ALL
 
 RIG = {
     **{f"kg1_{i}": value * PPM for i, value in zip("xyz", (20.0, -30.0, 40.0), strict=True)},

@@ -10,19 +10,19 @@ import pytest
 from paper_study import NOISE, TRUTH, study
 
 from inercal.cli import run
-from inercal.convert.correction import apply_to
-from inercal.convert.platform import not_applied, platform_model
-from inercal.errors import InputError
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.records.write import write_record
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.platform.coefficients import names, to_linear, units
-from inercal.units import parse_unit
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.platform import not_applied, platform_model
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.records.write import write_record
+from inercal.foundation.units import parse_unit
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.platform.coefficients import names, to_linear, units
 
 QUIET = replace(NOISE["low"], angle_random_walk=0.0, accelerometer=0.0, encoder=0.0)
 #: also gyro scale errors of 30, -20, 50 ppm
@@ -157,8 +157,8 @@ def test_what_is_not_applied_is_said():
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A calibration and a record of the paper's path with missing values, here."""
-    from inercal.estimate.files import save
-    from inercal.selfcal.before.simulate import to_record
+    from inercal.foundation.estimate.files import save
+    from inercal.systems.selfcal.before.simulate import to_record
 
     monkeypatch.chdir(tmp_path)
     save(estimate(TRUTH[:18]), tmp_path / "cal.json")

@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 from turntable_studies import DEG_H, GRAVITY, LATITUDE, TUMBLE, WHEEL, study, table
 
 from inercal.cli import run
-from inercal.convert.correction import apply_to
-from inercal.convert.models import model_of, worth_knowing
-from inercal.convert.table import TableInstrument
-from inercal.errors import InputError
-from inercal.estimate.files import save
-from inercal.geometry.earth import EARTH_RATE
-from inercal.instruments.by_angle import CHANNELS, channel_model
-from inercal.records.read import read
-from inercal.records.record import record_of
-from inercal.records.write import write_record
-from inercal.rigs.plans import grid
-from inercal.turntable.settings import RateTest
-from inercal.turntable.task import calibrate, simulate
-from inercal.units import parse_unit
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.models import model_of, worth_knowing
+from inercal.faces.convert.table import TableInstrument
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import record_of
+from inercal.foundation.records.write import write_record
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.settings import RateTest
+from inercal.systems.turntable.task import calibrate, simulate
 
 PLAN = grid((6, 6))
 TABLE = [{"joint": "phi1", "axis": "y"}, {"joint": "phi2", "axis": "z"}]

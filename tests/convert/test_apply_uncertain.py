@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from instruments_drawn import estimate_of, instrument, seeds
 
-from inercal.convert.correct import ImuModel, imu_model
-from inercal.convert.correction import apply_to
-from inercal.convert.models import model_of, worth_knowing
-from inercal.errors import InputError
-from inercal.imu.temperature.calibrations import fit_calibrations
-from inercal.inputs import Source
-from inercal.records.record import Record, record_of
-from inercal.units import parse_unit
+from inercal.faces.convert.correct import ImuModel, imu_model
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.models import model_of, worth_knowing
+from inercal.foundation.errors import InputError
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.record import Record, record_of
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
 
 def outputs(model, f, omega, **more):

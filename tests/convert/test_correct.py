@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from inercal.convert.correct import ImuModel, imu_model, not_applied
-from inercal.convert.correction import apply_to
-from inercal.errors import InputError
-from inercal.inputs import Source
-from inercal.instruments.triad import TriadModel
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.faces.convert.correct import ImuModel, imu_model, not_applied
+from inercal.faces.convert.correction import apply_to
+from inercal.foundation.errors import InputError
+from inercal.foundation.inputs import Source
+from inercal.foundation.instruments.triad import TriadModel
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
 from rows import for_each
 
 TRIAD = TriadModel(np.array([2.0, 3.0, 4.0]), np.eye(3) + 0.01 * np.triu(np.ones((3, 3)), 1), np.ones(3))

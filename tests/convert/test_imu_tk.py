@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from instruments_drawn import assert_same_corrections, instrument, seeds, there_and_back
 
-from inercal.convert import imu_tk
-from inercal.convert.correct import ImuModel
-from inercal.convert.other_tools import from_tool
-from inercal.errors import InputError
-from inercal.instruments.triad import TriadModel
+from inercal.faces.convert import imu_tk
+from inercal.faces.convert.correct import ImuModel
+from inercal.faces.convert.other_tools import from_tool
+from inercal.foundation.errors import InputError
+from inercal.foundation.instruments.triad import TriadModel
 from rows import for_each
 
 MODEL = instrument(1, sensitive=False)

@@ -9,10 +9,10 @@ from imucal import CalibrationInfo, FerrarisCalibrationInfo
 from imucal.management import load_calibration_info
 from instruments_drawn import assert_same_corrections, instrument, seeds, there_and_back
 
-from inercal.convert import imucal
-from inercal.convert.correct import ImuModel, imu_model
-from inercal.convert.other_tools import from_tool
-from inercal.errors import InputError
+from inercal.faces.convert import imucal
+from inercal.faces.convert.correct import ImuModel, imu_model
+from inercal.faces.convert.other_tools import from_tool
+from inercal.foundation.errors import InputError
 from rows import for_each
 
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from instruments_drawn import assert_same_corrections, instrument, seeds, there_and_back
 
-from inercal.convert import kalibr
-from inercal.convert.convention import in_si_outputs
-from inercal.convert.correct import ImuModel
-from inercal.convert.other_tools import from_tool, to_tool
-from inercal.errors import InputError
-from inercal.instruments.triad import TriadModel
+from inercal.faces.convert import kalibr
+from inercal.faces.convert.convention import in_si_outputs
+from inercal.faces.convert.correct import ImuModel
+from inercal.faces.convert.other_tools import from_tool, to_tool
+from inercal.foundation.errors import InputError
+from inercal.foundation.instruments.triad import TriadModel
 from rows import for_each
 
 RuamelYaml = pytest.importorskip("ruamel.yaml").YAML

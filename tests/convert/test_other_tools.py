@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from instruments_drawn import assert_same_corrections, estimate_of, instrument
 
-from inercal.convert.convention import flat, in_si_outputs
-from inercal.convert.correct import imu_model
-from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
-from inercal.errors import InputError
-from inercal.estimate.files import load, save
-from inercal.findings import Finding
+from inercal.faces.convert.convention import flat, in_si_outputs
+from inercal.faces.convert.correct import imu_model
+from inercal.faces.convert.other_tools import CONVENTIONS, from_tool, to_tool
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.findings import Finding
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

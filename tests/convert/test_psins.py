@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from instruments_drawn import assert_same_corrections, instrument, seeds, there_and_back
 
-from inercal.convert import psins
-from inercal.convert.convention import in_si_outputs
-from inercal.convert.correct import ImuModel
-from inercal.convert.other_tools import from_tool
-from inercal.errors import InputError
-from inercal.units import parse_unit
+from inercal.faces.convert import psins
+from inercal.faces.convert.convention import in_si_outputs
+from inercal.faces.convert.correct import ImuModel
+from inercal.faces.convert.other_tools import from_tool
+from inercal.foundation.errors import InputError
+from inercal.foundation.units import parse_unit
 from rows import for_each
 
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from inercal.designs import candidates as ca
-from inercal.designs.spherical import NAMES, basis
-from inercal.rigs.outputs import gravity_reference, rate_reference
-from inercal.rigs.tables import turntable
+from inercal.foundation.designs import candidates as ca
+from inercal.foundation.designs.spherical import NAMES, basis
+from inercal.foundation.rigs.outputs import gravity_reference, rate_reference
+from inercal.foundation.rigs.tables import turntable
 
 TERMS = ("F", "X", "Y", "Z", "XX", "YY", "XY", "XZ", "YZ")
 RATES = ("k_x", "k_y", "k_z")

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, gravity
 
-from inercal.designs.allowed import insensitive, within
-from inercal.designs.criteria import D
-from inercal.designs.exchange import exchange
-from inercal.errors import InputError
-from inercal.rigs.plans import grid
+from inercal.foundation.designs.allowed import insensitive, within
+from inercal.foundation.designs.criteria import D
+from inercal.foundation.designs.exchange import exchange
+from inercal.foundation.errors import InputError
+from inercal.foundation.rigs.plans import grid
 
 
 def test_whole_turns_do_not_matter():

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import RATES, TERMS, drift, from_monomials, gravity, with_rates
 
-from inercal.designs.candidates import Candidates, plain
-from inercal.designs.comparison import judge
-from inercal.designs.criteria import D, a_criterion, i_criterion
-from inercal.designs.spherical import NAMES, basis
-from inercal.geometry.rotations import elementary
-from inercal.rigs.plans import grid, named
+from inercal.foundation.designs.candidates import Candidates, plain
+from inercal.foundation.designs.comparison import judge
+from inercal.foundation.designs.criteria import D, a_criterion, i_criterion
+from inercal.foundation.designs.spherical import NAMES, basis
+from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.rigs.plans import grid, named
 
 LATITUDE = np.radians(45.0)
 SPHERE = a_criterion(np.eye(9))

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, with_rates
 
-from inercal.designs.candidates import Candidates
-from inercal.designs.criteria import D, a_criterion, covariance, i_criterion
-from inercal.rigs.plans import grid, named
+from inercal.foundation.designs.candidates import Candidates
+from inercal.foundation.designs.criteria import D, a_criterion, covariance, i_criterion
+from inercal.foundation.rigs.plans import grid, named
 
 
 def random_plan(rng, m, c, p, q):

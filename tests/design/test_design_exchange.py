@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, with_rates
 
-from inercal.designs.candidates import Candidates, plain
-from inercal.designs.criteria import D, a_criterion, covariance, i_criterion
-from inercal.designs.exchange import exchange
-from inercal.errors import InputError
-from inercal.rigs.plans import grid
+from inercal.foundation.designs.candidates import Candidates, plain
+from inercal.foundation.designs.criteria import D, a_criterion, covariance, i_criterion
+from inercal.foundation.designs.exchange import exchange
+from inercal.foundation.errors import InputError
+from inercal.foundation.rigs.plans import grid
 
 
 def criteria(p, rng):

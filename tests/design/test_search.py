@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.designs.search import from_starts, improved
-from inercal.estimate.executors import Threads
+from inercal.foundation.designs.search import from_starts, improved
+from inercal.foundation.estimate.executors import Threads
 
 
 @dataclass

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from inercal.designs.tolerances import LOOSEST, TIGHTEST, Price, Ratios, cheapest, total
+from inercal.foundation.designs.tolerances import LOOSEST, TIGHTEST, Price, Ratios, cheapest, total
 
 
 def same(fixed, by_error):

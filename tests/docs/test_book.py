@@ -12,15 +12,15 @@ from urllib.parse import unquote
 
 import pytest
 
-from inercal.aoa import limits as aoa
 from inercal.cli.tree import COMMANDS
-from inercal.findings import CODES
-from inercal.imu import limits as imu
-from inercal.instruments.terms import NOISE_TERMS, TERMS
-from inercal.records.channels import _EXAMPLES
-from inercal.selfcal import limits as selfcal
-from inercal.strapdown import limits as strapdown
-from inercal.turntable import limits as turntable
+from inercal.foundation.findings import CODES
+from inercal.foundation.instruments.terms import NOISE_TERMS, TERMS
+from inercal.foundation.records.channels import _EXAMPLES
+from inercal.systems.aoa import limits as aoa
+from inercal.systems.imu import limits as imu
+from inercal.systems.selfcal import limits as selfcal
+from inercal.systems.strapdown import limits as strapdown
+from inercal.systems.turntable import limits as turntable
 
 ROOT = Path(__file__).parents[2]
 VOID = {"area", "base", "br", "col", "embed", "hr", "img", "input", "link", "meta", "source", "track", "wbr"}

@@ -155,15 +155,15 @@ def test_the_studies_and_maps_on_the_pages_are_such(tmp_path):
 
     from new_studies import load_turntable_study
 
-    from inercal.laboratory.certificate.lab import read_lab
-    from inercal.laboratory.specification import specification_of
-    from inercal.records.maps import read_map
-    from inercal.studies.load import (
+    from inercal.faces.studies.load import (
         load_aoa_study,
         load_imu_study,
         load_selfcal_study,
         load_strapdown_study,
     )
+    from inercal.foundation.records.maps import read_map
+    from inercal.laboratory.certificate.lab import read_lab
+    from inercal.laboratory.specification import specification_of
 
     texts = [text for page in PAGES for text in blocks(page, "toml")]
     assert texts

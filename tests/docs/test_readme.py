@@ -16,11 +16,11 @@ from certified import LAB
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
 from inercal.laboratory.catalog import results
 from inercal.laboratory.store import open_store
-from inercal.records.read import read
-from inercal.records.write import write_record
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 HEADINGS = (

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inercal.errors import InputError
-from inercal.estimate.executors import Processes, Serial
-from inercal.estimate.runs import run
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.executors import Processes, Serial
+from inercal.foundation.estimate.runs import run
 
 
 def line_fit(rng):

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.estimate.budget import TypeA, TypeB, combine
-from inercal.estimate.least_squares import least_squares
-from inercal.estimate.result import coverage_factor
-from inercal.geometry.earth import gravity, gravity_gradient
+from inercal.foundation.estimate.budget import TypeA, TypeB, combine
+from inercal.foundation.estimate.least_squares import least_squares
+from inercal.foundation.estimate.result import coverage_factor
+from inercal.foundation.geometry.earth import gravity, gravity_gradient
 
 
 def scalar(source, u, dof=np.inf):

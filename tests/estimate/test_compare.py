@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.errors import InputError
-from inercal.estimate.budget import BudgetItem
-from inercal.estimate.compare import FAMILY, Saved, compare
-from inercal.estimate.files import load, save
-from inercal.estimate.result import Estimate, coverage_factor
-from inercal.findings import Status
-from inercal.inputs import Source
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.budget import BudgetItem
+from inercal.foundation.estimate.compare import FAMILY, Saved, compare
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.estimate.result import Estimate, coverage_factor
+from inercal.foundation.findings import Status
+from inercal.foundation.inputs import Source
 
 SITE = {"site": {"gravity_m_s2": 9.81, "latitude_rad": None}}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.estimate.consistency import nis, slow_power, surprising, whiteness
+from inercal.foundation.estimate.consistency import nis, slow_power, surprising, whiteness
 
 DIMS = 6
 

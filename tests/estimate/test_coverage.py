@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.errors import InputError
-from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.executors import Threads
-from inercal.estimate.runs import run
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.coverage import coverage, nees
+from inercal.foundation.estimate.executors import Threads
+from inercal.foundation.estimate.runs import run
 from rows import for_each
 
 
@@ -221,6 +221,9 @@ def test_bad_input_of_nees(P, said):
 
 
 def test_importing_loads_no_scipy():
-    program = "import inercal.estimate.coverage, inercal.estimate.runs, sys; sys.exit('scipy' in sys.modules)"
+    program = (
+        "import sys, inercal.foundation.estimate.coverage, inercal.foundation.estimate.runs\n"
+        "sys.exit('scipy' in sys.modules)"
+    )
     path = {"PYTHONPATH": ":".join(p for p in sys.path if p)}
     assert subprocess.run([sys.executable, "-c", program], env=path, check=False).returncode == 0

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.estimate.factor import CHOLESKY, EIGEN, FACTORS, NEGATIVE, SVD, cholesky, forward, root
+from inercal.foundation.estimate.factor import (
+    CHOLESKY,
+    EIGEN,
+    FACTORS,
+    NEGATIVE,
+    SVD,
+    cholesky,
+    forward,
+    root,
+)
 
 pytestmark = pytest.mark.kernels
 

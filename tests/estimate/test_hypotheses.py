@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from inercal.estimate import hypotheses
-from inercal.estimate.hypotheses import (
+from inercal.foundation.estimate import hypotheses
+from inercal.foundation.estimate.hypotheses import (
     Hypothesis,
     least_squares,
     likeliest,

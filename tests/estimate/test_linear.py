@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.estimate.identifiability import identify, in_words
-from inercal.estimate.least_squares import least_squares, whiten
-from inercal.geometry.rotations import elementary
-from inercal.validate.foundation import LONGLEY, LONGLEY_CERTIFIED, NORRIS, NORRIS_CERTIFIED
+from inercal.faces.validate.foundation import LONGLEY, LONGLEY_CERTIFIED, NORRIS, NORRIS_CERTIFIED
+from inercal.foundation.estimate.identifiability import identify, in_words
+from inercal.foundation.estimate.least_squares import least_squares, whiten
+from inercal.foundation.geometry.rotations import elementary
 from rows import for_each
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from inercal.estimate.budget import TypeB, combine
-from inercal.estimate.identifiability import learned
-from inercal.estimate.remarks import (
+from inercal.foundation.estimate.budget import TypeB, combine
+from inercal.foundation.estimate.identifiability import learned
+from inercal.foundation.estimate.remarks import (
     at_prior,
     at_prior_together,
     exact_gravity,
@@ -14,8 +14,8 @@ from inercal.estimate.remarks import (
     ruled_by_site,
     singular,
 )
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
 
 
 def texts(findings):

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
-from inercal.estimate.basis import Basis
-from inercal.estimate.budget import BudgetItem
-from inercal.estimate.files import from_json, to_json
-from inercal.estimate.repeat import combine_runs, mandel_paule
-from inercal.estimate.result import Estimate
-from inercal.findings import Finding, Status
-from inercal.inputs import Source
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.budget import BudgetItem
+from inercal.foundation.estimate.files import from_json, to_json
+from inercal.foundation.estimate.repeat import combine_runs, mandel_paule
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.inputs import Source
 
 
 def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:

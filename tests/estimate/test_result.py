@@ -9,10 +9,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.errors import CalibrationError
-from inercal.estimate.result import Estimate, Parameter, coverage_factor
-from inercal.estimate.rounding import rounded
-from inercal.findings import Status
+from inercal.foundation.errors import CalibrationError
+from inercal.foundation.estimate.result import Estimate, Parameter, coverage_factor
+from inercal.foundation.estimate.rounding import rounded
+from inercal.foundation.findings import Status
 from rows import for_each
 
 

@@ -15,7 +15,7 @@ import pytest
 import inercal as ic
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.findings import Status
+from inercal.foundation.findings import Status
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 import inercal as ic
-from inercal.errors import InercalError
 from inercal.examples import FOLDER
-from inercal.face.foresight import foresight, verticals
-from inercal.face.study import read_study
-from inercal.geometry.rotations import to_matrix
-from inercal.rigs.plans import named
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.platform.kinematics import attitude
-from inercal.selfcal.platform.plan import motion
-from inercal.strapdown.bounds import Pieces
-from inercal.strapdown.bounds import bounds as turn_bounds
-from inercal.turntable.model import channels_of
-from inercal.turntable.positions.fit import choose_terms
-from inercal.turntable.positions.planning import design
-from inercal.turntable.positions.tolerance_design import trial
+from inercal.faces.python.foresight import foresight, verticals
+from inercal.faces.python.study import read_study
+from inercal.foundation.errors import InercalError
+from inercal.foundation.geometry.rotations import to_matrix
+from inercal.foundation.rigs.plans import named
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.platform.kinematics import attitude
+from inercal.systems.selfcal.platform.plan import motion
+from inercal.systems.strapdown.bounds import Pieces
+from inercal.systems.strapdown.bounds import bounds as turn_bounds
+from inercal.systems.turntable.model import channels_of
+from inercal.systems.turntable.positions.fit import choose_terms
+from inercal.systems.turntable.positions.planning import design
+from inercal.systems.turntable.positions.tolerance_design import trial
 
 TURNS = '\n[plan]\nturns = [["y", "90 deg"], ["z", "-90 deg"], ["x", "90 deg"], ["y", "180 deg"]]\n'
 FILES = {

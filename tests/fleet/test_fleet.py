@@ -20,12 +20,12 @@ from independent.fleet import made
 
 import inercal as ic
 from inercal.cli import run
-from inercal.errors import InputError
-from inercal.estimate.cluster import ChunkLostError, Cluster
-from inercal.estimate.executors import Processes
-from inercal.fleet.batch import _chunks, _rows
-from inercal.fleet.manifest import Unit, read_manifest
-from inercal.fleet.unit import Batch, content_of, row_of, row_path
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.cluster import ChunkLostError, Cluster
+from inercal.foundation.estimate.executors import Processes
+from inercal.laboratory.fleet.batch import _chunks, _rows
+from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.unit import Batch, content_of, row_of, row_path
 from inercal.laboratory.store import make_store
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -197,7 +197,7 @@ def test_of_units_that_went_out_together_one_that_ends_its_process_is_a_row(ther
         (out / name).mkdir(parents=True)
     units = read_manifest(folder / "fleet.csv")
     work = Deadly(folder / "fleet.csv", content_of(units), folder / "imu.toml", None, out)
-    monkeypatch.setattr("inercal.fleet.batch._chunks", lambda numbers, size: _chunks(numbers, 4))
+    monkeypatch.setattr("inercal.laboratory.fleet.batch._chunks", lambda numbers, size: _chunks(numbers, 4))
     rows = _rows(work, units, Losing("local", 1), 1, lambda done, all: None)
     assert [row.serial for row in rows] == [unit.serial for unit in units]
     assert [row.serial for row in rows if row.status == "failed"] == ["SN 002"]
@@ -323,7 +323,7 @@ def test_what_failed_without_fault_of_the_unit_is_tried_again(there, tmp_path, m
         raise InputError(store, "cannot be reached")
 
     with monkeypatch.context() as patch:
-        patch.setattr("inercal.fleet.unit._keep", gone)
+        patch.setattr("inercal.laboratory.fleet.unit._keep", gone)
         rows = calibrated(folder, out, store=store).evidence.rows
     assert [row.message for row in rows] == [f"{store}: cannot be reached"] * 2
     assert list((out / "results").iterdir()) == []

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest
 
-from inercal.fleet.capability import Share, spreads
-from inercal.fleet.fleet import TREND_RISK, fleet_of
-from inercal.fleet.outliers import RISK, distances, limit
-from inercal.fleet.unit import Coefficient, Row
+from inercal.laboratory.fleet.capability import Share, spreads
+from inercal.laboratory.fleet.fleet import TREND_RISK, fleet_of
+from inercal.laboratory.fleet.outliers import RISK, distances, limit
+from inercal.laboratory.fleet.unit import Coefficient, Row
 from inercal.laboratory.specification import specification_of
 
 

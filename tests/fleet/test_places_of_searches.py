@@ -8,12 +8,12 @@ import pytest
 
 import inercal as ic
 from inercal.cli import run
-from inercal.estimate.cluster import Cluster
-from inercal.estimate.executors import Processes, Threads, numbered
 from inercal.examples import FOLDER
-from inercal.face.study import read_study
-from inercal.selfcal import verbs as selfcal
-from inercal.turntable import verbs as turntable
+from inercal.faces.python.study import read_study
+from inercal.foundation.estimate.cluster import Cluster
+from inercal.foundation.estimate.executors import Processes, Threads, numbered
+from inercal.systems.selfcal import verbs as selfcal
+from inercal.systems.turntable import verbs as turntable
 
 TABLE = ic.study(
     "turntable",

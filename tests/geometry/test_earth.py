@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from inercal.geometry import earth
+from inercal.foundation.geometry import earth
 
 # The four defining constants of WGS-84; everything else here follows from them.
 A, F, GM, RATE = 6378137.0, 1.0 / 298.257223563, 3.986004418e14, 7.292115e-5

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm
 
-from inercal.geometry import kernels, rotations
+from inercal.foundation.geometry import kernels, rotations
 
 pytestmark = pytest.mark.kernels
 

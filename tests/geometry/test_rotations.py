@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.geometry import rotations
-from inercal.geometry.rotations import SMALL_ANGLE
+from inercal.foundation.geometry import rotations
+from inercal.foundation.geometry.rotations import SMALL_ANGLE
 
 EPS = np.finfo(float).eps
 X, Y, Z = np.eye(3)
@@ -190,7 +190,7 @@ def test_batch_axes_broadcast():
 def test_loading_the_module_loads_neither_numba_nor_scipy():
     """Start-up time: a command that only shows help does not pay for compilers."""
     program = (
-        "import sys, inercal.geometry.rotations, inercal.geometry.earth;"
+        "import sys, inercal.foundation.geometry.rotations, inercal.foundation.geometry.earth;"
         "print(sorted({'numba', 'scipy'} & set(sys.modules)))"
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from new_studies import FILL
 
-from inercal._files import write_text
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS as TREE
-from inercal.errors import InputError
+from inercal.foundation._files import write_text
+from inercal.foundation.errors import InputError
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="rights, pipes and signals as on POSIX")
 COMMAND = [sys.executable, "-m", "inercal"]
@@ -178,7 +178,7 @@ def test_a_pipe_as_a_file_is_refused(words, expected, tmp_path, monkeypatch, cap
 
 def changed_while_read(monkeypatch, change) -> None:
     """Let a file change after its rows were read, before its checksum is taken."""
-    import inercal.records.read as reading
+    import inercal.foundation.records.read as reading
 
     source_of = reading.source_of
 

@@ -27,12 +27,12 @@ from new_studies import FILL
 
 from inercal.cli import main, run
 from inercal.cli.tree import COMMANDS as TREE
-from inercal.estimate.executors import Serial
-from inercal.estimate.files import save
 from inercal.examples import EXAMPLES, FOLDER
+from inercal.foundation.estimate.executors import Serial
+from inercal.foundation.estimate.files import save
+from inercal.foundation.records.read import read
 from inercal.laboratory.catalog import results
 from inercal.laboratory.store import open_store
-from inercal.records.read import read
 
 pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="forks and signals as on POSIX"),
@@ -97,8 +97,8 @@ CREATING = ("new", "examples")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """Studies with small tests, and recordings of them."""
-    from inercal.imu.simulate import draw_truth, hand_poses, simulate
-    from inercal.records.write import write_record
+    from inercal.foundation.records.write import write_record
+    from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
     path = tmp_path_factory.mktemp("killed")
     rng = np.random.default_rng(1)
@@ -257,8 +257,8 @@ def test_the_old_file_or_the_new_one(name, folder, tmp_path, monkeypatch):
     for path in folder.iterdir():
         (tmp_path / path.name).symlink_to(path)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("inercal.validate.run.SYSTEMS", {"foundation": "the quickest"})
-    monkeypatch.setattr("inercal.validate.run.executor", Serial)
+    monkeypatch.setattr("inercal.faces.validate.run.SYSTEMS", {"foundation": "the quickest"})
+    monkeypatch.setattr("inercal.faces.validate.run.executor", Serial)
     arguments = shlex.split(COMMANDS[name].replace("KEPT", kept(folder) if name == "show" else ""))
     old = None if arguments[0] in CREATING else OLD
     parent, written = os.getpid(), []
@@ -411,7 +411,7 @@ def test_a_stream_killed_while_it_saves_goes_on_with_the_same_digits(
     saves = []
 
     def at_the_third() -> None:
-        import inercal.estimate.checkpoint as checkpoint
+        import inercal.foundation.estimate.checkpoint as checkpoint
 
         write = checkpoint.write_bytes
         signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # here: a live source saves in another thread

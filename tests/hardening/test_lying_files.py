@@ -16,10 +16,10 @@ import h5py
 import numpy as np
 import pytest
 
-from inercal.errors import InputError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import child, limits, read
-from inercal.records.read.child import in_child
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import child, limits, read
+from inercal.foundation.records.read.child import in_child
 from rows import for_each
 
 T = np.arange(300) / 100
@@ -183,7 +183,7 @@ def test_definitions_within_each_other(tmp_path):
     bag(tmp_path / "many.bag", 9)
     many = (tmp_path / "many.bag").read_bytes()
     assert len(data) < len(many)
-    from inercal.records.read.bags import _fields, _Topic
+    from inercal.foundation.records.read.bags import _fields, _Topic
 
     names = {f"T{k}": ((), (("a", (2, f"T{k + 1}")), ("b", (2, f"T{k + 1}")))) for k in range(100)}
     topic = _Topic("T0", (), 1, names)
@@ -404,7 +404,7 @@ def test_a_new_python_imports_nothing_beside_a_recording(tmp_path, monkeypatch):
 
 _POOL = """
 from inercal import cli
-from inercal.estimate.executors import Processes
+from inercal.foundation.estimate.executors import Processes
 
 def run(arguments):
     print(sorted(found for _, found in Processes(1).map(len, [range(2), range(3)])))

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from lxml import etree
 from made import result
 
-from inercal._toml import check
-from inercal.errors import InputError
+from inercal.foundation._toml import check
+from inercal.foundation.errors import InputError
 from inercal.laboratory.certificate.lab import LabFile
 from inercal.laboratory.certificate.schema import fault
 from inercal.laboratory.certificate.written import certificate

@@ -12,15 +12,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from spoiled import spoil, whole
 
-from inercal.errors import InercalError
-from inercal.workbench.bench import open_bench
+from inercal.bench.workbench.bench import open_bench
+from inercal.foundation.errors import InercalError
 
 pytest.importorskip("nicegui")
 
 import httpx
 
-from inercal.workbench.jobs import State
-from inercal.workbench.rest import rest_of
+from inercal.bench.workbench.jobs import State
+from inercal.bench.workbench.rest import rest_of
 
 
 class Answering:
@@ -257,7 +257,7 @@ def answers(answering):
 def test_no_body_ends_the_queue(count, tmp_path, monkeypatch):
     """Each is answered, jobs are begun or refused, and all is told, also after a restart on the same folder."""
     with_a_job(tmp_path)
-    monkeypatch.setattr("inercal.workbench.jobs._begun", begun)
+    monkeypatch.setattr("inercal.bench.workbench.jobs._begun", begun)
     answering, rng = Answering(tmp_path, at_work=True), np.random.default_rng(14)
     statuses = set()
     try:

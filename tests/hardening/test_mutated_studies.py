@@ -14,13 +14,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from new_studies import filled
 
-from inercal.errors import StudyError
-from inercal.studies.aoa import aoa_study
-from inercal.studies.imu import imu_study
-from inercal.studies.load import load_aoa_study, load_selfcal_study
-from inercal.studies.selfcal import selfcal_study
-from inercal.studies.strapdown import strapdown_study
-from inercal.studies.turntable import turntable_study
+from inercal.faces.studies.aoa import aoa_study
+from inercal.faces.studies.imu import imu_study
+from inercal.faces.studies.load import load_aoa_study, load_selfcal_study
+from inercal.faces.studies.selfcal import selfcal_study
+from inercal.faces.studies.strapdown import strapdown_study
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
 
 # the seed of the examples is fixed: that of each test's own source
 FIXED = settings(

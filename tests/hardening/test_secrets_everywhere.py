@@ -47,7 +47,9 @@ def lines(joined):
 def check(rows, folder, capsys, monkeypatch):
     """Run command lines; nothing that is said, and no file in the folder, holds the secret."""
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("inercal.workbench.serve.serve", lambda *given: None)  # it would wait for browsers
+    monkeypatch.setattr(
+        "inercal.bench.workbench.serve.serve", lambda *given: None
+    )  # it would wait for browsers
     for name in FILES:
         (folder / name).write_bytes((FOLDER / name).read_bytes())
     wrong = []

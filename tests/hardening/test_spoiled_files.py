@@ -11,7 +11,7 @@ import pytest
 import spoiled_files
 from spoiled import strict, whole
 
-from inercal.records.read import limits
+from inercal.foundation.records.read import limits
 
 CASES, SHORT = 200, 20
 

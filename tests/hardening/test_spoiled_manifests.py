@@ -8,9 +8,9 @@ import random
 import pytest
 from independent.fleet import made
 
-from inercal.errors import InputError
-from inercal.fleet.manifest import Unit, read_manifest
-from inercal.fleet.unit import FAILED, Batch, result_path, row_path
+from inercal.foundation.errors import InputError
+from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.unit import FAILED, Batch, result_path, row_path
 
 SOUND = (
     'serial,files,imu.method,conditions.temperature\nSN 001,a.csv,means,21.5 degC\n"SN, 2","b.csv; c.csv",,\n'

@@ -7,15 +7,15 @@ import zlib
 import pytest
 from wires import HEADER, rows
 
-from inercal.errors import InercalError, InputError
-from inercal.live.address import SINKS, SOURCES, sink_of, source_of
-from inercal.live.feed import LONGEST, Feed
-from inercal.live.intake import Arrival
-from inercal.live.sources import Piece
-from inercal.records.maps import read_map
-from inercal.stream.lines import Lines
-from inercal.stream.monitor import Monitor
-from inercal.stream.run import run
+from inercal.bench.live.address import SINKS, SOURCES, sink_of, source_of
+from inercal.bench.live.feed import LONGEST, Feed
+from inercal.bench.live.intake import Arrival
+from inercal.bench.live.sources import Piece
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.monitor import Monitor
+from inercal.faces.stream.run import run
+from inercal.foundation.errors import InercalError, InputError
+from inercal.foundation.records.maps import read_map
 
 MANY = pytest.mark.parametrize("many", [150, pytest.param(3000, marks=pytest.mark.campaign)])
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.examples import FOLDER
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.ferraris.simulate import Session, quiet, simulate_session
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_full_truth
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.studies.ferraris import FerrarisTable, ferraris_settings
-from inercal.units import parse_unit
+from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.ferraris.simulate import Session, quiet, simulate_session
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_full_truth
 
 SETTINGS = ImuSettings(Site(9.81))
 UNSURE = ImuSettings(Site(9.81, (GravityInput("gravity", 2e-3, "m/s^2", 1.0),)))

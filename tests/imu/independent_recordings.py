@@ -6,9 +6,9 @@ import numpy as np
 from independent import imu
 from recordings import record_of
 
-from inercal.geometry.site import Site
-from inercal.imu.multiposition.calibration import MultipositionCalibration, calibrate_multiposition
-from inercal.imu.settings import ImuSettings
+from inercal.foundation.geometry.site import Site
+from inercal.systems.imu.multiposition.calibration import MultipositionCalibration, calibrate_multiposition
+from inercal.systems.imu.settings import ImuSettings
 
 SETTINGS = ImuSettings(Site(imu.G, (), imu.LATITUDE))
 

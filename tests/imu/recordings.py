@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.imu.settings import ImuSettings
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.studies.load import load_imu_study
-from inercal.units import parse_unit
+from inercal.faces.studies.load import load_imu_study
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.settings import ImuSettings
 
 
 def shipped(name: str, *overrides: str) -> tuple[Record, ImuSettings]:

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.geometry.rotations import conjugate, rotate
-from inercal.imu.identified import pose_words
-from inercal.imu.multiposition.accelerometer import fit_accelerometer, model_from
-from inercal.imu.multiposition.verdict import curing_pose
-from inercal.imu.simulate import hand_poses
+from inercal.foundation.geometry.rotations import conjugate, rotate
+from inercal.systems.imu.identified import pose_words
+from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer, model_from
+from inercal.systems.imu.multiposition.verdict import curing_pose
+from inercal.systems.imu.simulate import hand_poses
 
 G = 9.81
 

@@ -11,15 +11,15 @@ from catalogue import imu as catalogue
 from independent import imu
 from scipy.stats import binom
 
-from inercal.findings import Status
-from inercal.imu.multiposition.accelerometer import fit_accelerometer
-from inercal.imu.multiposition.calibration import calibrate_multiposition
-from inercal.imu.multiposition.deletion import LinearFit
-from inercal.imu.multiposition.drift import bias_drift_shown, scale_drift_shown
-from inercal.imu.multiposition.joint import join
-from inercal.imu.settings import ImuSettings
-from inercal.records.record import record_of
-from inercal.units import parse_unit
+from inercal.foundation.findings import Status
+from inercal.foundation.records.record import record_of
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
+from inercal.systems.imu.multiposition.deletion import LinearFit
+from inercal.systems.imu.multiposition.drift import bias_drift_shown, scale_drift_shown
+from inercal.systems.imu.multiposition.joint import join
+from inercal.systems.imu.settings import ImuSettings
 
 SETTINGS = ImuSettings(imu_faults.SITE)
 

@@ -10,24 +10,24 @@ import numpy as np
 import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth, one_calibration
 
-from inercal._toml import check
-from inercal.errors import RecordError, StudyError
-from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import run
-from inercal.findings import Status
-from inercal.geometry.site import Site
-from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.figures import pictures
-from inercal.imu.aided.simulate import simulate
-from inercal.imu.aided.walk import whiten
-from inercal.imu.settings import AidedSettings, ImuSettings, mounting_of, mountings
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.report.html import render
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.studies.imu import AidedTable, aided_settings
-from inercal.units import parse_quantity, parse_unit
+from inercal.faces.report.html import render
+from inercal.faces.studies.imu import AidedTable, aided_settings
+from inercal.foundation._toml import check
+from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.estimate.coverage import coverage
+from inercal.foundation.estimate.runs import run
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_quantity, parse_unit
+from inercal.systems.imu.aided.calibration import calibrate_aided
+from inercal.systems.imu.aided.figures import pictures
+from inercal.systems.imu.aided.simulate import simulate
+from inercal.systems.imu.aided.walk import whiten
+from inercal.systems.imu.settings import AidedSettings, ImuSettings, mounting_of, mountings
 
 CHAIN = turntable("two_axis_turntable", None)
 SEED = 20261121

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth
 
-from inercal._toml import check
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import Site
-from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.aided.simulate import rests_of, simulate
-from inercal.imu.settings import AidedSettings, ImuSettings
-from inercal.records.record import Record
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.studies.imu import AidedTable
+from inercal.faces.studies.imu import AidedTable
+from inercal.foundation._toml import check
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.record import Record
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.systems.imu.aided.calibration import calibrate_aided
+from inercal.systems.imu.aided.simulate import rests_of, simulate
+from inercal.systems.imu.settings import AidedSettings, ImuSettings
 
 CHAIN = turntable("two_axis_turntable", None)
 ACC, GYRO = ("acc_x", "acc_y", "acc_z"), ("gyro_x", "gyro_y", "gyro_z")

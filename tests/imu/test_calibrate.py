@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from recordings import arrays, record_of, shipped
 
-from inercal.errors import InputError
-from inercal.findings import Status
-from inercal.geometry.rotations import conjugate, exp, rotate
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.multiposition.poses import sweep
-from inercal.imu.recording import prepare
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.rotations import conjugate, exp, rotate
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.multiposition.poses import sweep
+from inercal.systems.imu.recording import prepare
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import Noise, draw_truth, hand_poses, simulate
 from rows import for_each
 
 SITE = Site(9.81, (), 0.8)

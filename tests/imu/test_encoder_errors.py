@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from recordings import shipped
 
-from inercal.findings import Status
-from inercal.imu.aided.calibration import calibrate_aided
-from inercal.records.record import Record
+from inercal.foundation.findings import Status
+from inercal.foundation.records.record import Record
+from inercal.systems.imu.aided.calibration import calibrate_aided
 from rows import for_each
 
 JOINTS = ("phi1", "phi2")

@@ -12,18 +12,18 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaigns.ferraris import one_calibration
 from ferraris_sessions import SETTINGS, session, with_values
 
-from inercal.convert.correct import imu_model
-from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import run
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
-from inercal.imu.ferraris.simulate import true_values
-from inercal.imu.settings import FerrarisSettings, ImuSettings
-from inercal.instruments.terms import TERMS
-from inercal.units import parse_unit
+from inercal.faces.convert.correct import imu_model
+from inercal.foundation.estimate.coverage import coverage
+from inercal.foundation.estimate.runs import run
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.instruments.terms import TERMS
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.method import NAMES, Inputs, coefficients, derivatives
+from inercal.systems.imu.ferraris.simulate import true_values
+from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
 
 FULL = 2.0 * math.pi
 OPTIONS = FerrarisSettings()

@@ -9,10 +9,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from ferraris_sessions import SETTINGS, UNSURE, options_of, record_of
 
-from inercal.findings import Status
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.figures import pictures
-from inercal.report.html import render
+from inercal.faces.report.html import render
+from inercal.foundation.findings import Status
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.figures import pictures
 
 ALL = [
     "Coefficients and their uncertainties",

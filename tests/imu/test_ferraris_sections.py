@@ -23,15 +23,15 @@ from ferraris_sessions import (
     with_values,
 )
 
-from inercal.errors import InputError, RecordError, StudyError
-from inercal.findings import Status
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.imu.ferraris.detection import detect
-from inercal.imu.ferraris.gravity_transfer import carry
-from inercal.imu.ferraris.names import NAMES, POSITIONS
-from inercal.imu.settings import FerrarisSettings
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.foundation.errors import InputError, RecordError, StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.detection import detect
+from inercal.systems.imu.ferraris.gravity_transfer import carry
+from inercal.systems.imu.ferraris.names import NAMES, POSITIONS
+from inercal.systems.imu.settings import FerrarisSettings
 
 OPTIONS = FerrarisSettings()
 

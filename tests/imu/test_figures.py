@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from inercal.findings import Status
-from inercal.geometry.rotations import conjugate, exp
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu import figures
-from inercal.imu.figures import main, page, pictures
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_truth, simulate
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.report.html import render
-from inercal.units import parse_unit
+from inercal.faces.report.html import render
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.rotations import conjugate, exp
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu import figures
+from inercal.systems.imu.figures import main, page, pictures
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_truth, simulate
 
 ALL = [
     "Poses",

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.geometry.rotations import conjugate, exp, multiply
-from inercal.imu.ferraris.names import NAMES as SECTIONS
-from inercal.imu.settings import Disturbances
-from inercal.imu.simulate import draw_truth, hand_poses, simulate, with_values
-from inercal.imu.task import calibrate
-from inercal.imu.task import simulate as simulate_study
-from inercal.studies.load import load_imu_study
+from inercal.faces.studies.load import load_imu_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.rotations import conjugate, exp, multiply
+from inercal.systems.imu.ferraris.names import NAMES as SECTIONS
+from inercal.systems.imu.settings import Disturbances
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate, with_values
+from inercal.systems.imu.task import calibrate
+from inercal.systems.imu.task import simulate as simulate_study
 
 GRAVITY, RATE = 9.81, 100.0
 TRUTH = draw_truth(np.random.default_rng(1))

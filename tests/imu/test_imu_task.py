@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from recordings import shipped
 
-from inercal.geometry.site import Site
-from inercal.imu.aided.calibration import AidedCalibration
-from inercal.imu.ferraris.calibration import FerrarisCalibration
-from inercal.imu.multiposition.calibration import MultipositionCalibration
-from inercal.imu.task import calibrate
+from inercal.foundation.geometry.site import Site
+from inercal.systems.imu.aided.calibration import AidedCalibration
+from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
+from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
+from inercal.systems.imu.task import calibrate
 
 
 def test_the_settings_choose_the_method():

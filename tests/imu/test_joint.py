@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from recordings import arrays, record_of
 
-from inercal.geometry.site import GravityInput, Site
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.multiposition.gyro import _excess
-from inercal.imu.settings import ImuSettings
-from inercal.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.multiposition.gyro import _excess
+from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
 SETTINGS = ImuSettings(Site(9.81, (), 0.8), g_sensitivity=True)
 
@@ -66,7 +66,7 @@ def test_the_gain_of_a_pose_is_what_moving_it_does(record, axis):
     spoiled[dwell.start : dwell.stop] += model.gain @ error
     moved = calibrate(record_of(t, spoiled, gyro), SETTINGS)
     assert moved.poses.dwells == poses.dwells
-    from inercal.imu.multiposition.joint import join
+    from inercal.systems.imu.multiposition.joint import join
 
     joint = join(poses.accelerometer, base.gyro)
     predicted = joint.by_force[:, 3 * k : 3 * k + 3] @ error

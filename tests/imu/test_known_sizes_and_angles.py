@@ -25,18 +25,18 @@ from recordings import shipped
 from scipy.stats import binom
 
 import inercal as ic
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.imu.figures import page, pictures
-from inercal.imu.settings import (
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.terms import GYRO_TRIAD
+from inercal.systems.imu.figures import page, pictures
+from inercal.systems.imu.settings import (
     Exclusion,
     ImuSettings,
     KnownRatesSettings,
     KnownTurnsSettings,
     MeansSettings,
 )
-from inercal.imu.task import calibrate, calibrate_files
-from inercal.instruments.terms import GYRO_TRIAD
+from inercal.systems.imu.task import calibrate, calibrate_files
 from rows import for_each
 
 
@@ -119,7 +119,7 @@ def test_the_mean_of_a_moving_pose_is_named_and_can_be_left_out():
 
 
 def test_samples_of_a_recording_are_no_pose_means():
-    from inercal.errors import RecordError
+    from inercal.foundation.errors import RecordError
 
     record, _ = shipped("xsens")
     with pytest.raises(RecordError, match=r'most of them like the one before.* imu.method = "multiposition"'):

@@ -9,13 +9,13 @@ from independent_recordings import SETTINGS, calibrated
 from recordings import record_of
 from scipy.stats import binom, chi2
 
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.imu.figures import pictures
-from inercal.imu.multiposition.calibration import calibrate_multiposition
-from inercal.imu.multiposition.deletion import LinearFit, held_out, outlying
-from inercal.imu.settings import Exclusion
-from inercal.studies.imu import imu_study
+from inercal.faces.studies.imu import imu_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.systems.imu.figures import pictures
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
+from inercal.systems.imu.multiposition.deletion import LinearFit, held_out, outlying
+from inercal.systems.imu.settings import Exclusion
 from rows import for_each
 
 SOUND = 4  # a seed whose recording is sound, and whose seventh turn tells much of the gyro

@@ -9,9 +9,9 @@ from independent_recordings import SETTINGS, calibrated
 from recordings import arrays, record_of
 from scipy.stats import chi2
 
-from inercal.findings import Status
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from inercal.foundation.findings import Status
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.simulate import Noise, draw_truth, hand_poses, simulate
 from rows import for_each
 
 

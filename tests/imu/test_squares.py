@@ -9,11 +9,11 @@ from independent_recordings import SETTINGS, calibrated
 from recordings import shipped
 from scipy.stats import chi2
 
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.imu.multiposition.accelerometer import fit_accelerometer, specific_force
-from inercal.imu.task import calibrate
-from inercal.studies.imu import imu_study
+from inercal.faces.studies.imu import imu_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer, specific_force
+from inercal.systems.imu.task import calibrate
 from rows import for_each
 
 G = 9.81

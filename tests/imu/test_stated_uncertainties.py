@@ -11,8 +11,8 @@ import pytest
 from campaigns.imu import one_calibration
 from scipy.stats import binom
 
-from inercal.estimate.coverage import coverage
-from inercal.estimate.runs import run
+from inercal.foundation.estimate.coverage import coverage
+from inercal.foundation.estimate.runs import run
 
 SEED = 20261121
 RUNS = 250

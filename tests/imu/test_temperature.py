@@ -8,18 +8,18 @@ import pytest
 from scipy.signal import lfilter
 
 from inercal.cli import run
-from inercal.errors import InputError, RecordError
-from inercal.estimate.files import load, save
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.imu.temperature.calibrations import fit_calibrations
-from inercal.imu.temperature.cubic import fit_points, fit_sweep
-from inercal.imu.temperature.figures import pictures
-from inercal.imu.temperature.sweep import branches, fit_recording
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.temperature.calibrations import fit_calibrations
+from inercal.systems.imu.temperature.cubic import fit_points, fit_sweep
+from inercal.systems.imu.temperature.figures import pictures
+from inercal.systems.imu.temperature.sweep import branches, fit_recording
 
 TRUTH = np.array([1.0, -0.02, 3e-4, -2e-6])
 SOURCE = Source("sweep.csv", "")

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from inercal.geometry.rotations import exp, to_matrix
-from inercal.imu.multiposition.gyro import unpack
-from inercal.imu.turns import (
+from inercal.foundation.geometry.rotations import exp, to_matrix
+from inercal.foundation.instruments.triad import TriadModel
+from inercal.systems.imu.multiposition.gyro import unpack
+from inercal.systems.imu.turns import (
     attitudes,
     carried,
     carried_with_derivatives,
@@ -16,7 +17,6 @@ from inercal.imu.turns import (
     thin,
     whole_turns,
 )
-from inercal.instruments.triad import TriadModel
 
 RNG = np.random.default_rng(11)
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.errors import QuantityError
-from inercal.instruments.dsi import as_written, dsi, from_dsi, is_coherent, stated
-from inercal.instruments.reference_types import reference_type, reference_types
-from inercal.instruments.terms import MODEL_TERMS, NOISE_TERMS, NUMBERED_TERMS, TERMS
-from inercal.units import parse_unit
+from inercal.foundation.errors import QuantityError
+from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent, stated
+from inercal.foundation.instruments.reference_types import reference_type, reference_types
+from inercal.foundation.instruments.terms import MODEL_TERMS, NOISE_TERMS, NUMBERED_TERMS, TERMS
+from inercal.foundation.units import parse_unit
 from rows import for_each
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.instruments.noise import BIAS_FLOOR, SYMBOLS, NoiseModel, allan_terms, flicker
-from inercal.instruments.terms import NOISE_TERMS, noise_shown, noise_term
-from inercal.units import parse_quantity, parse_unit
+from inercal.foundation.instruments.noise import BIAS_FLOOR, SYMBOLS, NoiseModel, allan_terms, flicker
+from inercal.foundation.instruments.terms import NOISE_TERMS, noise_shown, noise_term
+from inercal.foundation.units import parse_quantity, parse_unit
 from rows import for_each
 
 

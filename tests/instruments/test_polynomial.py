@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
-from inercal.instruments.terms import TERMS
+from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
+from inercal.foundation.instruments.terms import TERMS
 from rows import for_each
 
 EVERY = [(kind, channel) for kind, channels in CHANNELS.items() for channel in channels]

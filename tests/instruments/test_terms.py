@@ -2,8 +2,8 @@
 
 import re
 
-from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
-from inercal.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
+from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
+from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD, TERMS
 from rows import for_each
 
 

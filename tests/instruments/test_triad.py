@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.instruments.triad import TriadModel, triad_from_terms
+from inercal.foundation.instruments.triad import TriadModel, triad_from_terms
 
 
 @st.composite

@@ -14,8 +14,8 @@ from lxml import etree
 from made import result as made
 
 import inercal as ic
-from inercal.errors import InputError
-from inercal.estimate.files import save, to_json
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save, to_json
 from inercal.laboratory.certificate.elements import NAMESPACES
 from inercal.laboratory.certificate.page import page
 from inercal.laboratory.certificate.parsing import parsed
@@ -142,7 +142,7 @@ HOSTILE = {
 
 READING = """
 import json, resource, sys, time
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.certificate.reading import estimate_of_certificate as read
 
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

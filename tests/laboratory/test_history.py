@@ -11,9 +11,9 @@ from made import result
 
 import inercal as ic
 from inercal.cli import run
-from inercal.errors import InputError
-from inercal.estimate.files import save
-from inercal.findings import Status
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save
+from inercal.foundation.findings import Status
 from inercal.laboratory.catalog import values_of
 from inercal.laboratory.history import history
 from inercal.laboratory.keep import Item, keep

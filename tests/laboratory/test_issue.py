@@ -9,9 +9,9 @@ from made import ITEM, result
 from sqlalchemy import text
 
 from inercal.cli import run
-from inercal.errors import InputError
-from inercal.estimate.files import save
 from inercal.examples import FOLDER
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import show
 from inercal.laboratory.check import check

@@ -13,9 +13,9 @@ from made import ITEM, result
 from sqlalchemy import select, text
 
 from inercal.cli import run
-from inercal.errors import InputError
-from inercal.estimate.files import save
-from inercal.inputs import Source
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import save
+from inercal.foundation.inputs import Source
 from inercal.laboratory import keep as keeping
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import instruments, results, show, values_of

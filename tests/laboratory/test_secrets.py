@@ -15,9 +15,9 @@ import pytest
 from certified import LAB
 from independent.fleet import made
 
+from inercal.bench.workbench.bench import open_bench
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.workbench.bench import open_bench
 
 SECRET = "Hunter2SeCrEt"
 FERRARIS = ["ferraris.csv.gz", "--map", "ferraris-map.toml", "--study", "ferraris.toml"]

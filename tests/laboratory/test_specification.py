@@ -6,7 +6,7 @@ import pytest
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.specification import conformity, specification_of
 
 

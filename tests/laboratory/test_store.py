@@ -18,9 +18,9 @@ import pytest
 from made import ITEM, result
 from sqlalchemy import text
 
-from inercal.errors import InputError
-from inercal.estimate.files import to_json
-from inercal.inputs import Source
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import to_json
+from inercal.foundation.inputs import Source
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import find, instruments, results, show, values_of
 from inercal.laboratory.check import check
@@ -396,7 +396,7 @@ import resource, signal, sys
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 from made import ITEM, result
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.keep import keep
 from inercal.laboratory.store import open_store
 store = open_store({str(tmp_path / "store")!r})

@@ -13,8 +13,8 @@ import pytest
 from inercal.cli import run
 from inercal.cli.stored_line import COMMANDS_AGAIN, OPTIONS_AGAIN, Use, stored_line
 from inercal.cli.tree import COMMANDS, app
-from inercal.errors import InputError
 from inercal.examples import EXAMPLES, FOLDER
+from inercal.foundation.errors import InputError
 from inercal.laboratory.again import LaidOut, laid_out
 from inercal.laboratory.objects import Objects
 from rows import for_each
@@ -376,7 +376,7 @@ def test_a_result_that_names_a_device_or_a_pipe_is_not_waited_for(path, lab, cap
 
 def test_files_that_a_study_and_a_map_name_by_absolute_paths_are_those_kept(lab, tmp_path, capsys):
     """A study, a map and an option with absolute names, all files gone: the rerun reads what was kept."""
-    from inercal.estimate.files import load
+    from inercal.foundation.estimate.files import load
 
     far = tmp_path / "far away"
     far.mkdir()

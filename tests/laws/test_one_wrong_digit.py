@@ -7,7 +7,7 @@ import pytest
 import inercal as ic
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.records.write import write_record
+from inercal.foundation.records.write import write_record
 
 ROW = 200
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from inercal.geometry import rotations
+from inercal.foundation.geometry import rotations
 
 TOLERANCE = 1e-14
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])

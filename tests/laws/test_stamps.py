@@ -12,12 +12,12 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 import inercal as ic
-from inercal.records.read import read
-from inercal.records.stamps import Order, outlying
-from inercal.records.write import SUFFIXES, write_record
-from inercal.stream.doubt import Doubt, HeldRows
-from inercal.stream.lines import Lines
-from inercal.stream.run import Saving, run
+from inercal.faces.stream.doubt import Doubt, HeldRows
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import Saving, run
+from inercal.foundation.records.read import read
+from inercal.foundation.records.stamps import Order, outlying
+from inercal.foundation.records.write import SUFFIXES, write_record
 from rows import for_each
 
 T = np.round(np.arange(400) * 0.004, 3)

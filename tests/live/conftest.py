@@ -3,7 +3,7 @@
 import pytest
 from wires import STUDY, Mosquitto
 
-from inercal.live import intake, pieces
+from inercal.bench.live import intake, pieces
 
 
 @pytest.fixture

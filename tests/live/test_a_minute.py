@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from wires import HEADER, Cable, Mosquitto, by_stream, free_port, rows, until, waiting
 
-from inercal.live import measurement
+from inercal.bench.live import measurement
 
 SENDER = Path(__file__).with_name("sender.py")
 

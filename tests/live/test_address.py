@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from inercal.errors import InputError
-from inercal.live.address import Mqtt, Pieces, Replay, Serial, Tcp, Text, Udp, sink_of, source_of
+from inercal.bench.live.address import Mqtt, Pieces, Replay, Serial, Tcp, Text, Udp, sink_of, source_of
+from inercal.foundation.errors import InputError
 from rows import for_each
 
 

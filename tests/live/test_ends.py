@@ -3,10 +3,10 @@
 import pytest
 from wires import HEADER, Cable, Server, by_stream, free_port, rows, until, waiting, wire
 
-from inercal.live import intake as intakes
-from inercal.live.address import source_of
-from inercal.live.intake import Intake
-from inercal.live.measurement import measure
+from inercal.bench.live import intake as intakes
+from inercal.bench.live.address import source_of
+from inercal.bench.live.intake import Intake
+from inercal.bench.live.measurement import measure
 
 KINDS = ("serial", "udp", "tcp", "mqtts")
 

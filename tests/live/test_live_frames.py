@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from wires import HEADER, by_stream, rows, until, waiting, wire
 
-from inercal.live.measurement import measure
-from inercal.records.read import read
+from inercal.bench.live.measurement import measure
+from inercal.foundation.records.read import read
 
 MAP = """
 [file]

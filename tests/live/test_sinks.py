@@ -11,14 +11,14 @@ import pytest
 from pyarrow import parquet
 from wires import HEADER, Datagrams, by_stream, free_port, rows, until, waiting, wire
 
-from inercal.face.study import study_of
-from inercal.live import sinks
-from inercal.live.address import sink_of, source_of
-from inercal.live.counts import Spread, Stamps
-from inercal.live.estimators import of_study
-from inercal.live.measurement import Measurement, Plan, measure
-from inercal.live.rows import Row, payload
-from inercal.live.sinks import Outlet
+from inercal.bench.live import sinks
+from inercal.bench.live.address import sink_of, source_of
+from inercal.bench.live.counts import Spread, Stamps
+from inercal.bench.live.estimators import of_study
+from inercal.bench.live.measurement import Measurement, Plan, measure
+from inercal.bench.live.rows import Row, payload
+from inercal.bench.live.sinks import Outlet
+from inercal.faces.python.study import study_of
 
 
 def through(near, running, lines):

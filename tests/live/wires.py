@@ -18,10 +18,10 @@ import tty
 import numpy as np
 import pytest
 
-from inercal.live.measurement import measure
-from inercal.stream.lines import Lines
-from inercal.stream.monitor import Monitor
-from inercal.stream.run import run
+from inercal.bench.live.measurement import measure
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.monitor import Monitor
+from inercal.faces.stream.run import run
 
 HEADER = b"t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n"
 

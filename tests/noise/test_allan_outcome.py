@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inercal.errors import InputError, RecordError
-from inercal.estimate.files import load, save
-from inercal.findings import Finding, Status
-from inercal.inputs import Source
-from inercal.instruments.noise import SYMBOLS, NoiseModel
-from inercal.noise.outcome import noise_of
-from inercal.noise.rest import unrest
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import STANDARD_GRAVITY, parse_unit
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.estimate.files import load, save
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.inputs import Source
+from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
+from inercal.foundation.noise.outcome import noise_of
+from inercal.foundation.noise.rest import unrest
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
 
 RATE = 100.0
 SOURCE = Source("static.csv", "0" * 64)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.noise.dwell_means import fit, fit_pooled
+from inercal.foundation.noise.dwell_means import fit, fit_pooled
 
 
 def test_the_means_of_the_stretches_say_nothing():

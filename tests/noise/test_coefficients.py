@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
-from inercal.instruments.noise import SYMBOLS, NoiseModel
-from inercal.noise.coefficients import noise_coefficients
-from inercal.noise.deviation import AllanDeviation, allan_deviation
+from inercal.foundation.errors import InputError
+from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
+from inercal.foundation.noise.coefficients import noise_coefficients
+from inercal.foundation.noise.deviation import AllanDeviation, allan_deviation
 
 
 def exact(model, n=100_000, interval=0.01):

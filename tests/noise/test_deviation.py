@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError, RecordError
-from inercal.instruments.noise import SYMBOLS, NoiseModel
-from inercal.noise.deviation import PRESENT, allan_deviation, regular
-from inercal.noise.dwell_means import overlapping_variance, running_sums
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
+from inercal.foundation.noise.deviation import PRESENT, allan_deviation, regular
+from inercal.foundation.noise.dwell_means import overlapping_variance, running_sums
 from rows import for_each
 
 

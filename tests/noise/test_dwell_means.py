@@ -6,9 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.instruments.noise import BIAS_FLOOR
-from inercal.noise.dwell_means import AllanFit, equivalent_dof, fit, overlapping_variance, running_sums
-from inercal.validate.noise import thousand
+from inercal.faces.validate.noise import thousand
+from inercal.foundation.instruments.noise import BIAS_FLOOR
+from inercal.foundation.noise.dwell_means import (
+    AllanFit,
+    equivalent_dof,
+    fit,
+    overlapping_variance,
+    running_sums,
+)
 
 
 def flicker(rng, n, channels, B, interval):

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.instruments.noise import NoiseModel, allan_terms
-from inercal.noise import covariance
-from inercal.noise.covariance import ALPHA, degrees_of_freedom, lag_one, pair_sums, sums
-from inercal.noise.curve import Curve
-from inercal.noise.deviation import PRESENT, allan_deviation
-from inercal.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
+from inercal.foundation.instruments.noise import NoiseModel, allan_terms
+from inercal.foundation.noise import covariance
+from inercal.foundation.noise.covariance import ALPHA, degrees_of_freedom, lag_one, pair_sums, sums
+from inercal.foundation.noise.curve import Curve
+from inercal.foundation.noise.deviation import PRESENT, allan_deviation
+from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
 
 
 def generalised(kind, n):

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from campaigns.noise import MIXES, one_recording
 
-from inercal.estimate.result import coverage_factor
-from inercal.estimate.runs import run
-from inercal.instruments.noise import SYMBOLS
+from inercal.foundation.estimate.result import coverage_factor
+from inercal.foundation.estimate.runs import run
+from inercal.foundation.instruments.noise import SYMBOLS
 
 SEED, RUNS = 20261121, 250
 

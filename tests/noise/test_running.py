@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.noise.dwell_means import overlapping_variance, running_sums
-from inercal.noise.running import cascade, empty_octaves, empty_window, slide
-from inercal.records.dwells import windowed_variance
+from inercal.foundation.noise.dwell_means import overlapping_variance, running_sums
+from inercal.foundation.noise.running import cascade, empty_octaves, empty_window, slide
+from inercal.foundation.records.dwells import windowed_variance
 
 
 def variances(x, window):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.noise.dwell_means import overlapping_variance, running_sums
+from inercal.foundation.noise.dwell_means import overlapping_variance, running_sums
 
 
 @settings(deadline=None)

@@ -5,12 +5,12 @@ import plain_filterpy
 import pytest
 from paper_study import study
 
-from inercal.estimate.factor import EIGEN, root
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.settings import Filter
+from inercal.foundation.estimate.factor import EIGEN, root
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters import quaternion
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.settings import Filter
 
 STEPS = 400
 

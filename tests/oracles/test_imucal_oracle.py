@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
 from ferraris_sessions import SETTINGS, UNSURE, options_of, record_of
 
 from inercal.examples import FOLDER
-from inercal.imu.ferraris.calibration import calibrate_ferraris
-from inercal.validate.imu import IMUCAL
+from inercal.faces.validate.imu import IMUCAL
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 
 ROUNDING = 1e-11
 
@@ -88,7 +88,7 @@ def test_equal_to_its_published_results(name):
 @pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
 def test_corrected_outputs_are_equal(name):
     """The whole correction, applied to the recording by either."""
-    from inercal.convert.correct import imu_model
+    from inercal.faces.convert.correct import imu_model
 
     record = record_of(name)
     estimate = calibrate_ferraris(record, SETTINGS, options_of(name, turn="-360 deg")).estimate

@@ -7,11 +7,11 @@ from SALib.analyze import sobol as salib
 from SALib.sample import sobol as salib_points
 from scipy.stats import sobol_indices
 
-from inercal.rigs.distribution import uniform
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import exact
-from inercal.sensitivities.sampled import draw, estimate, evaluate
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import exact
+from inercal.foundation.sensitivities.sampled import draw, estimate, evaluate
 
 H = np.radians(2.0 / 60.0)
 TABLE = turntable("two_axis_turntable", uniform(H))

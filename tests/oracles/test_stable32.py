@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.noise.covariance import degrees_of_freedom
-from inercal.noise.deviation import allan_deviation
+from inercal.foundation.noise.covariance import degrees_of_freedom
+from inercal.foundation.noise.deviation import allan_deviation
 
 FOLDER = Path(__file__).parents[1] / "data" / "stable32"
 PHASE = np.loadtxt(FOLDER / "PHASE.DAT")

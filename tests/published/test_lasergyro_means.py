@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.records.read import read
+from inercal.foundation.records.read import read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 GYRO_DEG_H = (-12.27146244545836, 0.43769421496551497, 8.356900789311554)

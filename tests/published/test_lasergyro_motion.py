@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.geometry.earth import EARTH_RATE
-from inercal.records.read import read
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.records.read import read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 LATITUDE = np.radians(34.246048)

@@ -10,9 +10,9 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from inercal.noise.coefficients import noise_coefficients
-from inercal.noise.deviation import allan_deviation
-from inercal.validate.noise import ALLANTOOLS, TAU
+from inercal.faces.validate.noise import ALLANTOOLS, TAU
+from inercal.foundation.noise.coefficients import noise_coefficients
+from inercal.foundation.noise.deviation import allan_deviation
 
 ROWS, INTERVAL = 184718, 0.01
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from inercal.instruments.noise import SYMBOLS, NoiseModel, allan_terms
-from inercal.noise.coefficients import noise_coefficients
-from inercal.noise.deviation import allan_deviation
-from inercal.records.read import read
+from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel, allan_terms
+from inercal.foundation.noise.coefficients import noise_coefficients
+from inercal.foundation.noise.deviation import allan_deviation
+from inercal.foundation.records.read import read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 DEG_H = np.radians(1.0 / 3600.0)

@@ -12,16 +12,16 @@ largest of nine errors is above 0.03 % in six of ten recordings, also with the b
 import numpy as np
 import pytest
 
-from inercal._toml import check
-from inercal.errors import StudyError
 from inercal.examples import FOLDER
-from inercal.findings import Status
-from inercal.geometry.site import Site
-from inercal.imu.aided.calibration import calibrate_aided
-from inercal.imu.settings import ImuSettings
-from inercal.records.read import read
-from inercal.studies.imu import AidedTable, aided_settings
-from inercal.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
+from inercal.faces.studies.imu import AidedTable, aided_settings
+from inercal.faces.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
+from inercal.foundation._toml import check
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.records.read import read
+from inercal.systems.imu.aided.calibration import calibrate_aided
+from inercal.systems.imu.settings import ImuSettings
 
 ACC, GYRO, ACC_BIAS = map(np.array, (TABLE_ACC, TABLE_GYRO, TABLE_ACC_BIAS))  # the bias: mean over the test
 GYRO_BIAS = np.array([0.0007962550847312129, 0.0002793371758986746, 0.0028202067690031776])  # at the start

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, gating_costs, study
 
-from inercal.estimate.factor import NEGATIVE
-from inercal.geometry.rotations import boxminus, boxplus
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.path_design import at_rest, with_stops
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.filters import quaternion
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.monte_carlo import campaign
-from inercal.selfcal.platform.coefficients import NAMES, to_linear, to_product
-from inercal.selfcal.platform.kinematics import attitude
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
-from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.settings import Filter, Gating
+from inercal.foundation.estimate.factor import NEGATIVE
+from inercal.foundation.geometry.rotations import boxminus, boxplus
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.path_design import at_rest, with_stops
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.filters import quaternion
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.monte_carlo import campaign
+from inercal.systems.selfcal.platform.coefficients import NAMES, to_linear, to_product
+from inercal.systems.selfcal.platform.kinematics import attitude
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.settings import Filter, Gating
 
 SEED, SEEDS = 20261121, range(8)
 SIZE = np.abs(TRUTH[:18])

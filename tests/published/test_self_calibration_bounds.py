@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PER_HOUR, TRUTH, gating_costs, study
 
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.observability import observability
-from inercal.selfcal.before.path_design import at_rest, with_stops
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.platform.coefficients import DO, DS, KG0, NAMES
-from inercal.selfcal.platform.plan import motion
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.observability import observability
+from inercal.systems.selfcal.before.path_design import at_rest, with_stops
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.platform.coefficients import DO, DS, KG0, NAMES
+from inercal.systems.selfcal.platform.plan import motion
 
 #: (path, noise) -> bound of each coefficient [% of its true value], 1 sigma
 TABLE = {

@@ -18,13 +18,13 @@ from scipy.optimize import brentq
 from scipy.signal import butter, sosfilt, sosfreqz
 from sting_study import DEG, G, clipped, layout, scenario, study
 
-from inercal.aoa.disturbances import Disturbances
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.paper import lever, residuals, static
-from inercal.aoa.paper.methods import low_passed, measure
-from inercal.aoa.settings import Methods, MotionPlan, Noise, Timing
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.paper import lever, residuals, static
+from inercal.systems.aoa.paper.methods import low_passed, measure
+from inercal.systems.aoa.settings import Methods, MotionPlan, Noise, Timing
+from inercal.systems.aoa.simulate import simulate
 
 DA, DW, L = 1e-4 * G, 0.2 * DEG, 0.5
 RATIO = DA / G  # an error of 1e-4 g as an angle

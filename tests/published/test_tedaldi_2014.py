@@ -13,12 +13,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "imu"))
 from recordings import shipped
 
-from inercal.convert.other_tools import to_tool
-from inercal.findings import Status
-from inercal.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.imu.multiposition.poses import choose, sweep
-from inercal.imu.recording import prepare
-from inercal.validate.imu import TK_BIAS, TK_GYRO, TK_SCALE, TK_T
+from inercal.faces.convert.other_tools import to_tool
+from inercal.faces.validate.imu import TK_BIAS, TK_GYRO, TK_SCALE, TK_T
+from inercal.foundation.findings import Status
+from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
+from inercal.systems.imu.multiposition.poses import choose, sweep
+from inercal.systems.imu.recording import prepare
 
 IMU_TK = {"scale": TK_SCALE, "T": TK_T, "bias": TK_BIAS, "gyro": TK_GYRO}
 # a = T K (raw - offset) - b, so that the output at zero is offset + (T K)^-1 b

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from inercal.examples import FOLDER
-from inercal.imu.temperature.sweep import fit_recording
-from inercal.records.read import read
-from inercal.validate.imu import SWEEP
+from inercal.faces.validate.imu import SWEEP
+from inercal.foundation.records.read import read
+from inercal.systems.imu.temperature.sweep import fit_recording
 
 #: channel -> standard deviation of the residuals, R^2
 PEER = {

@@ -14,19 +14,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from inercal.geometry.site import Site
-from inercal.rigs.chain import Chain, Error, Joint, Scope
-from inercal.rigs.distribution import uniform
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.plans import grid, named
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import averages, exact, local, sampled
-from inercal.turntable import regression
-from inercal.turntable.model import stated_values, table_model
-from inercal.turntable.positions import planning
-from inercal.turntable.positions.tolerance import shifts, sphere_moments
-from inercal.turntable.settings import Constraint, Design, Instrument, TurntableSettings
-from inercal.units import parse_unit
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.plans import grid, named
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import averages, exact, local, sampled
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable import regression
+from inercal.systems.turntable.model import stated_values, table_model
+from inercal.systems.turntable.positions import planning
+from inercal.systems.turntable.positions.tolerance import shifts, sphere_moments
+from inercal.systems.turntable.settings import Constraint, Design, Instrument, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 LATITUDE = np.radians(39.1)  # any will do: only the shift of the maps depends on it

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.inputs import Source
-from inercal.records.checks import check
-from inercal.records.column import Column
-from inercal.units import parse_unit
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.checks import check
+from inercal.foundation.records.column import Column
+from inercal.foundation.units import parse_unit
 
 ARCSEC = 1.0 / 3600.0
 

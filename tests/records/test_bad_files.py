@@ -10,11 +10,11 @@ import numpy as np
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
-from inercal.findings import CODES
-from inercal.records.guess import guess_map
-from inercal.records.maps import read_map
-from inercal.records.read import read
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import CODES
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
 
 ROWS = np.column_stack([np.arange(60) / 100, np.random.default_rng(5).standard_normal((60, 2))])
 TEXT = (

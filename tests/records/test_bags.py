@@ -7,9 +7,9 @@ import pytest
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from inercal.errors import MapError, MissingExtraError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import canonical_units, read
+from inercal.foundation.errors import MapError, MissingExtraError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import canonical_units, read
 
 N = 300
 RNG = np.random.default_rng(25)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from inercal.errors import InputError, MapError, RecordError
-from inercal.records.read import read
+from inercal.foundation.errors import InputError, MapError, RecordError
+from inercal.foundation.records.read import read
 from rows import for_each
 
 COLUMNS = "".join(

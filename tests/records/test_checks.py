@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.inputs import Source
-from inercal.records.checks import check
-from inercal.records.checks.values import at_ends, outliers, saturation, time_axis, time_unit
-from inercal.records.column import Column
-from inercal.records.places import places
-from inercal.units import parse_unit
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.checks import check
+from inercal.foundation.records.checks.values import at_ends, outliers, saturation, time_axis, time_unit
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.places import places
+from inercal.foundation.units import parse_unit
 from rows import for_each
 
 

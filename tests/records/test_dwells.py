@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.records.dwells import Dwell, breaks, static_intervals, window_samples, windowed_variance
+from inercal.foundation.records.dwells import (
+    Dwell,
+    breaks,
+    static_intervals,
+    window_samples,
+    windowed_variance,
+)
 
 
 def direct(x, window):

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import loadmat, savemat
 
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.records.read import read, read_runs
+from inercal.foundation.records.read import read, read_runs
 
 XSENS_MAP = (FOLDER / "xsens-map.toml").read_text("utf-8")
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.errors import MapError, RecordError
-from inercal.records.checksums import CHECKS
-from inercal.records.frame_kernel import value
-from inercal.records.frames import Frame, Turns, frames_in
-from inercal.records.maps import read_map
-from inercal.records.read import read
+from inercal.foundation.errors import MapError, RecordError
+from inercal.foundation.records.checksums import CHECKS
+from inercal.foundation.records.frame_kernel import value
+from inercal.foundation.records.frames import Frame, Turns, frames_in
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
 from rows import for_each
 
 #: name -> check of the text 123456789, as the catalogue of parametrised CRC algorithms publishes it

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from inercal.errors import InputError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.maps import read_map
-from inercal.records.read import read
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
 from rows import for_each
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.io import netcdf_file, savemat
 
-from inercal.errors import MapError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import canonical_units, read
+from inercal.foundation.errors import MapError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import canonical_units, read
 
 RNG = np.random.default_rng(21)
 N = 120

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.errors import InputError, MapError, RecordError
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.records.read.table import FileOptions
+from inercal.foundation.errors import InputError, MapError, RecordError
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.read.table import FileOptions
 from rows import for_each
 
 

@@ -9,8 +9,8 @@ import pytest
 import scipy.io
 from scipy.io import savemat
 
-from inercal.errors import MapError, RecordError
-from inercal.records.read import mat, read
+from inercal.foundation.errors import MapError, RecordError
+from inercal.foundation.records.read import mat, read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 TABLE = np.column_stack([np.arange(50) / 100, np.random.default_rng(0).standard_normal((50, 3))])

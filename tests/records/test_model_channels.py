@@ -3,9 +3,9 @@
 import numpy as np
 from nptdms import ChannelObject, TdmsWriter
 
-from inercal.records.guess import guess_map
-from inercal.records.read import read
-from inercal.records.titles import numbered, titled
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.titles import numbered, titled
 from rows import for_each
 
 RNG = np.random.default_rng(5)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.errors import MapError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import read
+from inercal.foundation.errors import MapError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 T = np.arange(50) / 100

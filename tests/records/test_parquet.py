@@ -5,9 +5,9 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from inercal.errors import MissingExtraError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import canonical_units, read
+from inercal.foundation.errors import MissingExtraError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import canonical_units, read
 
 T = np.arange(40) / 50
 ACC = np.array([0.1, -0.2, 9.8]) + 0.01 * np.random.default_rng(23).standard_normal((40, 3))

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from inercal.records.read import read, text
-from inercal.records.read.layout import Block, Layout
-from inercal.records.read.plain_rows import LEAST, MOST, fives, plain_rows
+from inercal.foundation.records.read import read, text
+from inercal.foundation.records.read.layout import Block, Layout
+from inercal.foundation.records.read.plain_rows import LEAST, MOST, fives, plain_rows
 
 COMMA = b",.\n#%"
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.records.guess import guess_map
-from inercal.records.maps import read_map
-from inercal.records.read import read
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 EARTH_RATE = 7.292115e-5

@@ -5,12 +5,12 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from inercal.errors import RecordError
-from inercal.findings import CODES, Finding
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.units import parse_unit
+from inercal.foundation.errors import RecordError
+from inercal.foundation.findings import CODES, Finding
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
 
 SOURCE = Source("run7.csv", "0" * 64)
 T = 0.01 * np.arange(5)

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from inercal.errors import RecordError
-from inercal.records.read import read, read_runs
+from inercal.foundation.errors import RecordError
+from inercal.foundation.records.read import read, read_runs
 
 
 def csv(folder, name, channels, start=0.0):

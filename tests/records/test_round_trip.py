@@ -5,15 +5,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
-from inercal.findings import Finding
-from inercal.inputs import Source
-from inercal.records.column import Column, clocks
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.records.stamps import with_sound_stamps
-from inercal.records.write import SUFFIXES, write_record
-from inercal.units import parse_unit
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import Finding
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column, clocks
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.records.stamps import with_sound_stamps
+from inercal.foundation.records.write import SUFFIXES, write_record
+from inercal.foundation.units import parse_unit
 
 SOURCE = Source("run 7 °.csv", "0" * 64)
 CHANNELS = [
@@ -194,7 +194,7 @@ def test_what_cannot_be_written(tmp_path, monkeypatch):
 def test_a_missing_extra_says_how_to_install_it(tmp_path, monkeypatch):
     import sys
 
-    from inercal.errors import MissingExtraError
+    from inercal.foundation.errors import MissingExtraError
 
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     t = np.arange(2.0)

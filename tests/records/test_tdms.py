@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
-from inercal.errors import MapError, MissingExtraError, RecordError
-from inercal.records.guess import guess_map
-from inercal.records.read import canonical_units, read
+from inercal.foundation.errors import MapError, MissingExtraError, RecordError
+from inercal.foundation.records.guess import guess_map
+from inercal.foundation.records.read import canonical_units, read
 
 RNG = np.random.default_rng(24)
 ACC = np.array([0.1, -0.2, 9.8]) + 0.01 * RNG.standard_normal((600, 3))

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError, RecordError
-from inercal.records.read import layout, read
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.records.read import layout, read
 from rows import for_each
 
 HEADER = "t [s],acc_x [m/s^2],gyro_x [deg/h]"
@@ -279,7 +279,7 @@ def test_progress_counts_bytes_up_to_all(tmp_path, monkeypatch):
 def test_a_plain_csv_loads_nothing_heavy(tmp_path):
     path = written(tmp_path / "a.csv", table())
     script = (
-        "import sys; from inercal.records.read import read; read(sys.argv[1]);"
+        "import sys; from inercal.foundation.records.read import read; read(sys.argv[1]);"
         "print([name for name in ('scipy', 'pydantic', 'h5py', 'numba', 'xarray', 'pint') if name in sys.modules])"
     )
     run = subprocess.run([sys.executable, "-c", script, path], capture_output=True, text=True, check=True)
@@ -298,7 +298,7 @@ def test_long_recordings_take_little_memory(tmp_path):
         file.write(",".join(["t [s]", *(f"{n} [{u}]" for n, u in zip(names, units, strict=True))]) + "\n")
         file.writelines(f"{index / 100:.2f},{line}\n" for index in range(rows))
     script = (
-        "import resource, sys, numpy; from inercal.records.read import read, text;"
+        "import resource, sys, numpy; from inercal.foundation.records.read import read, text;"
         "peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024;"
         "before = peak(); record = read(sys.argv[1]); print(peak() - before, len(record['acc_x'].values))"
     )

@@ -1,6 +1,6 @@
 """A title says which channel a column is and in which unit, in the spellings that loggers use."""
 
-from inercal.records.titles import fits, titled
+from inercal.foundation.records.titles import fits, titled
 from rows import for_each
 
 

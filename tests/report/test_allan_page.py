@@ -7,13 +7,13 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inercal.inputs import Source
-from inercal.instruments.noise import NoiseModel
-from inercal.noise.outcome import noise_of
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.report.allan import cells, page, pictures, shown_units
-from inercal.units import parse_unit
+from inercal.faces.report.allan import cells, page, pictures, shown_units
+from inercal.foundation.inputs import Source
+from inercal.foundation.instruments.noise import NoiseModel
+from inercal.foundation.noise.outcome import noise_of
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
 
 HOSTILE = "<script>alert(1)</script>&.csv"
 

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from inercal.estimate.formula import Formula
-from inercal.report.formulas import clauses
+from inercal.faces.report.formulas import clauses
+from inercal.foundation.estimate.formula import Formula
 from rows import for_each
 
 

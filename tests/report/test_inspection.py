@@ -9,13 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from inercal.estimate.basis import Basis
-from inercal.estimate.result import Estimate
-from inercal.findings import Finding, Status
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.report.inspection import (
+from inercal.faces.report.inspection import (
     channels_table,
     inspection_pictures,
     norms,
@@ -23,7 +17,13 @@ from inercal.report.inspection import (
     sparkline,
     summary,
 )
-from inercal.units import parse_unit
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
 
 SOURCE = Source("runs/a <b>.csv", "0f" * 32)
 

@@ -5,11 +5,23 @@ import re
 import numpy as np
 import pytest
 
-from inercal.report.cells import small
-from inercal.report.coefficients import limits
-from inercal.report.marks import Axis, Band, Bars, Cells, Colours, Dots, Level, Line, Note, Panel, Strips
-from inercal.report.panels import draw, symlog_ticks
-from inercal.report.rig import Triad, Turn, rig
+from inercal.faces.report.cells import small
+from inercal.faces.report.coefficients import limits
+from inercal.faces.report.marks import (
+    Axis,
+    Band,
+    Bars,
+    Cells,
+    Colours,
+    Dots,
+    Level,
+    Line,
+    Note,
+    Panel,
+    Strips,
+)
+from inercal.faces.report.panels import draw, symlog_ticks
+from inercal.faces.report.rig import Triad, Turn, rig
 
 
 def words(picture):

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from inercal.report.sphere import flat
+from inercal.faces.report.sphere import flat
 
 
 def test_equal_areas_on_the_sphere_are_equal_on_the_disc():

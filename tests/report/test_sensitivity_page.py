@@ -7,17 +7,17 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inercal.estimate.basis import Basis
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.geometry.site import Site
-from inercal.rigs.distribution import normal, uniform
-from inercal.rigs.plans import grid, listed, named
-from inercal.rigs.tables import turntable
-from inercal.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
-from inercal.turntable.figures.sensitivity import page as sensitivity_page
-from inercal.turntable.sensitivity.analysis import analyse
-from inercal.turntable.settings import Analysis, Design, TurntableSettings
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.plans import grid, listed, named
+from inercal.foundation.rigs.tables import turntable
+from inercal.systems.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
+from inercal.systems.turntable.figures.sensitivity import page as sensitivity_page
+from inercal.systems.turntable.sensitivity.analysis import analyse
+from inercal.systems.turntable.settings import Analysis, Design, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 EXACT = Analysis()

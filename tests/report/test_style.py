@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.report.style import COLOURS, envelope, figure, plain_unit, power_of_ten, powers_of_ten, svg
+from inercal.faces.report.style import COLOURS, envelope, figure, plain_unit, power_of_ten, powers_of_ten, svg
 
 DRAW = """
 import numpy as np
-from inercal.report.style import figure, svg
+from inercal.faces.report.style import figure, svg
 with figure(4.0, 2.0) as page:
     axes = page.subplots()
     axes.plot(np.sin(np.arange(50)))

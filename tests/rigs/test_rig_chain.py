@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from inercal.geometry.rotations import elementary, exp, to_matrix
-from inercal.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
-from inercal.rigs.distribution import density, normal, uniform
-from inercal.rigs.tables import turntable
+from inercal.foundation.geometry.rotations import elementary, exp, to_matrix
+from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
+from inercal.foundation.rigs.distribution import density, normal, uniform
+from inercal.foundation.rigs.tables import turntable
 
 ARC_MINUTE = np.radians(1.0 / 60.0)
 ANGLE = st.floats(-10.0, 10.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from inercal.geometry.earth import EARTH_RATE
-from inercal.rigs.outputs import NAMES, gravity_reference, rate_reference, table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.rigs.outputs import NAMES, gravity_reference, rate_reference, table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
 
 G, LATITUDE = 9.8, np.radians(40.0)
 TABLE = turntable("two_axis_turntable", None)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.rigs.outputs import gravity_reference
-from inercal.rigs.plans import NAMED, grid, listed, named
-from inercal.rigs.tables import turntable
+from inercal.foundation.rigs.outputs import gravity_reference
+from inercal.foundation.rigs.plans import NAMED, grid, listed, named
+from inercal.foundation.rigs.tables import turntable
 
 TABLE = turntable("two_axis_turntable", None)
 

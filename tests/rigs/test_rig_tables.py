@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.geometry.rotations import elementary
-from inercal.rigs.chain import Scope
-from inercal.rigs.distribution import normal, uniform
-from inercal.rigs.tables import TABLES, slots, turntable
+from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.tables import TABLES, slots, turntable
 
 LAW = uniform(np.radians(2.0 / 60.0))
 TWO = (

@@ -11,18 +11,18 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, TRUTH, study
 from scipy.stats import chi2
 
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.geometry.earth import gravity
-from inercal.geometry.rotations import exp, to_matrix
-from inercal.geometry.site import Site
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.find_base import heading, is_rough, relative, with_base
-from inercal.selfcal.platform.coefficients import BETA
-from inercal.selfcal.platform.rig import Base, Gimbals
-from inercal.selfcal.task import calibrate
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import gravity
+from inercal.foundation.geometry.rotations import exp, to_matrix
+from inercal.foundation.geometry.site import Site
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.find_base import heading, is_rough, relative, with_base
+from inercal.systems.selfcal.platform.coefficients import BETA
+from inercal.systems.selfcal.platform.rig import Base, Gimbals
+from inercal.systems.selfcal.task import calibrate
 
 FRAMES = st.sampled_from(["nue", "enu", "ned"])
 TILT = st.tuples(*[st.floats(-1.5, 1.5)] * 2)

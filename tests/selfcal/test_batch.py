@@ -10,7 +10,7 @@ from scipy.linalg import cholesky_banded
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from inercal.geometry.rotations import (
+from inercal.foundation.geometry.rotations import (
     boxminus,
     boxplus,
     exp,
@@ -19,21 +19,21 @@ from inercal.geometry.rotations import (
     multiply,
     right_jacobian,
 )
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.batch import _terms_at, estimate_map, inverse_diagonal
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.residuals import (
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters.batch import _terms_at, estimate_map, inverse_diagonal
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.residuals import (
     first_reading,
     readings,
     sensed,
     turns,
 )
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import product_slope, to_linear
-from inercal.selfcal.platform.plan import path
-from inercal.selfcal.platform.recording import Steps
-from inercal.selfcal.settings import Filter, Gating
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import product_slope, to_linear
+from inercal.systems.selfcal.platform.plan import path
+from inercal.systems.selfcal.platform.recording import Steps
+from inercal.systems.selfcal.settings import Filter, Gating
 
 EXTENDED_TRUTH = TRUTH + np.append(np.zeros(18), [40e-6, -60e-6, 80e-6, 1e-4, -2e-4, 1.5e-4])
 
@@ -259,7 +259,7 @@ def test_gate_stops_the_same_measurements_as_in_the_filter(rule, stops):
 
 
 def test_other_gimbals_and_base():
-    from inercal.selfcal.platform.rig import Base, Gimbals
+    from inercal.systems.selfcal.platform.rig import Base, Gimbals
 
     rig = {"gimbals": Gimbals(("y", "z", "x"), (1, -1, 1)), "base": Base("ned", 0.7, (0.01, -0.02))}
     recording, given, truth = recorded(41, "best", 1.0, **rig)

@@ -9,19 +9,19 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PPM, PRIOR, TRUTH, gating_costs, study
 from scipy import stats
 
-from inercal.geometry.rotations import boxminus, exp, multiply, rotate
-from inercal.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
-from inercal.selfcal.before.observability import observability
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.plain import accelerometers, platform_rate
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import KA0, KG0, product_slope, to_linear
-from inercal.selfcal.platform.kinematics import attitude
-from inercal.selfcal.platform.plan import Plan, Rest, motion
-from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.platform.states import ALL
-from inercal.selfcal.settings import Filter, Gating, Noise
+from inercal.foundation.geometry.rotations import boxminus, exp, multiply, rotate
+from inercal.systems.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
+from inercal.systems.selfcal.before.observability import observability
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters.plain import accelerometers, platform_rate
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import KA0, KG0, product_slope, to_linear
+from inercal.systems.selfcal.platform.kinematics import attitude
+from inercal.systems.selfcal.platform.plan import Plan, Rest, motion
+from inercal.systems.selfcal.platform.rig import Gimbals
+from inercal.systems.selfcal.platform.states import ALL
+from inercal.systems.selfcal.settings import Filter, Gating, Noise
 
 
 def along(study, **other):

@@ -8,24 +8,24 @@ import sys
 import numpy as np
 import pytest
 
-import inercal.selfcal
+import inercal.systems.selfcal
 
 RUN = """
 import json, sys
 import numpy as np
 from paper_study import study
-from inercal.selfcal.before import bounds
-from inercal.selfcal.filters import error_state
-from inercal.selfcal.filters import gimbal
-from inercal.selfcal.filters import quaternion
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.considered import both
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.platform.states import ALL
-from inercal.selfcal.settings import Filter
-from inercal.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.before import bounds
+from inercal.systems.selfcal.filters import error_state
+from inercal.systems.selfcal.filters import gimbal
+from inercal.systems.selfcal.filters import quaternion
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.considered import both
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.states import ALL
+from inercal.systems.selfcal.settings import Filter
+from inercal.systems.selfcal.before.simulate import experiment, simulate
 
 found = {}
 for extended in (False, True):
@@ -51,7 +51,7 @@ print(json.dumps({"found": found, "missed": missed}))
 
 def ran(**environment):
     """What a new process finds on a short path with all recursive filters, the bounds, and what is not fitted."""
-    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.selfcal.__file__)))
+    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.systems.selfcal.__file__)))
     studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
     paths = os.pathsep.join([package, studies])
     done = subprocess.run(

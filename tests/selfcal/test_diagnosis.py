@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 
-from inercal.findings import CODES, EVERYTHING, Finding, Harm
-from inercal.geometry.rotations import exp, rotate
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.settings import Disturbances
+from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
+from inercal.foundation.geometry.rotations import exp, rotate
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.settings import Disturbances
 
 PROBLEM = problem(study())
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from paper_study import PRIOR, study
 
-from inercal.geometry.rotations import (
+from inercal.foundation.geometry.rotations import (
     boxminus,
     boxplus,
     conjugate,
@@ -17,16 +17,16 @@ from inercal.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters import error_state
-from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform import linearised, model
-from inercal.selfcal.platform.kinematics import attitude, joint_axes
-from inercal.selfcal.platform.rig import Gimbals, World
-from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, state_vector
-from inercal.selfcal.settings import Filter
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters import error_state
+from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform import linearised, model
+from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
+from inercal.systems.selfcal.platform.rig import Gimbals, World
+from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, state_vector
+from inercal.systems.selfcal.settings import Filter
 
 EXTENDED = Filter(extended=True)
 
@@ -289,7 +289,7 @@ def test_a_wrong_start_that_is_told_as_such_does_no_harm(short, degrees):
 @pytest.mark.parametrize(("rule", "few"), [("any", 0.0), ("two", 0.4), ("channel", 0.4)])
 def test_near_level_gating(short, rule, few):
     """On the paper's path one axis is level at any time: rule `any` never admits an accelerometer, the others do."""
-    from inercal.selfcal.settings import Gating
+    from inercal.systems.selfcal.settings import Gating
 
     of = problem(study(filter=Filter(gating=Gating(rule))))
     found, plain = estimate(short, of), estimate(short, problem(study()))

@@ -10,17 +10,17 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, TRUTH, study
 from scipy.stats import chi2
 
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
-from inercal.records.record import Record
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.gaps import broken, held_rate, taken_anew, with_held
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import product_slope, to_product
-from inercal.selfcal.platform.kinematics import attitude
-from inercal.selfcal.reading import recording_of
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
+from inercal.foundation.records.record import Record
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.filters.gaps import broken, held_rate, taken_anew, with_held
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
+from inercal.systems.selfcal.platform.kinematics import attitude
+from inercal.systems.selfcal.reading import recording_of
 
 BEST = study("best")
 SEEDS = range(6)

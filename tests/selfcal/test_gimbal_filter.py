@@ -8,17 +8,17 @@ import pytest
 from paper_study import DEG, study
 from unscented_twin import RIGS, angle_rates, gimbal, joints
 
-from inercal.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters import gimbal as model
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import NAMES, to_linear
-from inercal.selfcal.platform.kinematics import angles, parity
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
-from inercal.selfcal.platform.rig import Gimbals, World
-from inercal.selfcal.settings import Filter
+from inercal.foundation.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters import gimbal as model
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.coefficients import NAMES, to_linear
+from inercal.systems.selfcal.platform.kinematics import angles, parity
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.rig import Gimbals, World
+from inercal.systems.selfcal.settings import Filter
 from rows import for_each
 
 EVERY_RIG = tuple(product(permutations("xyz"), product((1, -1), repeat=3)))

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from paper_study import study
 
-from inercal.errors import RecordError, StudyError
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.records.write import write_record
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.platform.plan import Plan, Rest, Turn
-from inercal.selfcal.reading import recording_of
-from inercal.selfcal.task import calibrate
+from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.task import calibrate
 
 D = np.pi / 180.0
 PLAN = Plan(

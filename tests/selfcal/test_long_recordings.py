@@ -7,15 +7,15 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from paper_study import ARCSEC, study
 
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis import small
-from inercal.selfcal.diagnosis.small import small_errors
-from inercal.selfcal.filters import averaged, run
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import to_linear
-from inercal.selfcal.settings import Filter, Noise
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.diagnosis import small
+from inercal.systems.selfcal.diagnosis.small import small_errors
+from inercal.systems.selfcal.filters import averaged, run
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.coefficients import to_linear
+from inercal.systems.selfcal.settings import Filter, Noise
 
 SETTINGS = study("best")
 OF = problem(SETTINGS)

@@ -7,14 +7,14 @@ from independent.selfcal import BEST, NOMINAL, TRUTH, Drive, Faults
 from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
-from inercal.records.read import read
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.filters.gaps import walked
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import product_slope, to_product
-from inercal.selfcal.reading import recording_of
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.records.read import read
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.filters.gaps import walked
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
+from inercal.systems.selfcal.reading import recording_of
 
 DRIVE = Drive(BEST, ramp=0.4, measured=True)
 GAPS = {"30 s": ((150.0, 180.0),), "three": ((40.0, 50.0), (150.0, 180.0), (400.0, 404.0))}

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-import inercal.selfcal
+import inercal.systems.selfcal
 
-FOLDER = Path(inercal.selfcal.__file__).parent
+FOLDER = Path(inercal.systems.selfcal.__file__).parent
 KERNELS = ("kernel", "merged", "inlined", "allocating")
 
 

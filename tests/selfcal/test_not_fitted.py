@@ -7,7 +7,7 @@ from independent import selfcal as platform
 from independent.selfcal import THREE, TRUTH, Drive, Faults, G
 
 import inercal as ic
-from inercal.findings import Status
+from inercal.foundation.findings import Status
 
 pytestmark = pytest.mark.slow
 

@@ -12,17 +12,17 @@ from scipy.stats import chi2
 import inercal as ic
 from inercal.cli.options import ResultOutput
 from inercal.cli.selfcal import _live
-from inercal.errors import RecordError, StudyError
-from inercal.geometry.rotations import conjugate, rotate, to_matrix
-from inercal.selfcal.filters.problem import encoders_at, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
-from inercal.selfcal.platform.rig import JOINTS
-from inercal.selfcal.platform.states import ALL, RIG
-from inercal.selfcal.reading import recording_of
-from inercal.selfcal.still_joints import told_apart, without_fixed
-from inercal.stream.lines import Lines
-from inercal.stream.run import run
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import run
+from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.geometry.rotations import conjugate, rotate, to_matrix
+from inercal.systems.selfcal.filters.problem import encoders_at, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import EXTENDED, to_linear
+from inercal.systems.selfcal.platform.rig import JOINTS
+from inercal.systems.selfcal.platform.states import ALL, RIG
+from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.still_joints import told_apart, without_fixed
 
 TWO = (("x", 90), ("z", 180), ("x", 90), ("z", -90), ("x", 90), ("z", 180), ("x", -180))
 ONE = (("z", 360), ("z", -360))

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
-from inercal.estimate.files import to_json
-from inercal.findings import Finding, Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.diagnosis.gross import implausible
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import NAMES, to_product, units
-from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.result.outcome import assemble, verdict
+from inercal.foundation.estimate.files import to_json
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.diagnosis.gross import implausible
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import NAMES, to_product, units
+from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.result.outcome import assemble, verdict
 
 LATITUDE_U = 0.02 * DEG
 GRAVITY_U = 1e-4

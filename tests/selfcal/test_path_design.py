@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from paper_study import study
 
-from inercal.errors import StudyError
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.path_design import at_rest, design, lasting, stated_moves, with_stops
-from inercal.selfcal.before.path_search import criterion, search
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
-from inercal.selfcal.settings import Search
+from inercal.foundation.errors import StudyError
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.path_design import at_rest, design, lasting, stated_moves, with_stops
+from inercal.systems.selfcal.before.path_search import criterion, search
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.settings import Search
 
 FEW = Search(turns=3, angle=np.radians(60.0), criterion="mean")
 
@@ -44,14 +44,14 @@ def test_it_is_at_least_as_good_as_the_known_paths(designed):
 
 @pytest.mark.parametrize("goal", [{}, {"ds_z": 1e-7, "do_y": 1e-7, "ka0_x": 1e-6}])
 def test_it_is_at_least_as_good_by_the_worst_coefficient(goal, monkeypatch):
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=8))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=8))
     asked = study("best", goal=goal, search=Search(criterion="worst"))
     assert value(search(asked), asked) <= value(asked.plan, asked)
 
 
 def test_in_a_small_space_it_finds_the_best_of_all(monkeypatch):
     """Two turns of 90° or 180° of any joints, 270 s at most: every sequence judged at full steps."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
     asked = study("plain", search=Search(turns=2, angle=np.pi / 2, time=270.0, criterion="mean"))
     asked = replace(asked, limits={"th_y": (-np.pi / 3, np.pi / 3)})
     turns = [(joint, count * np.pi / 2) for joint in "xz" for count in (-3, -2, -1, 1, 2, 3)]
@@ -87,7 +87,7 @@ def test_it_keeps_time_number_and_limits():
 @pytest.mark.parametrize("step", [0.7, 7.0])
 def test_it_keeps_time_where_turns_take_no_whole_number_of_rows(step, monkeypatch):
     """Sixteen turns of 20 s fill 320 s, but each takes 20.3 or 21 s of rows: a rest fills what is left of one less."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=1))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=1))
     asked = study("best", search=replace(FEW, time=320.0, angle=np.radians(20.0)))
     found = search(replace(asked, plan=replace(asked.plan, step=step)))
     assert 320.0 - step < found.duration <= 320.0

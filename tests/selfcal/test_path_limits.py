@@ -8,20 +8,20 @@ import pytest
 from paper_study import study
 
 import inercal as ic
-from inercal.errors import StudyError
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.before.left_out import left_out, shifts
-from inercal.selfcal.before.path_design import design
-from inercal.selfcal.before.path_search import criterion, search
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.limits import LIMITS
-from inercal.selfcal.platform.coefficients import to_product
-from inercal.selfcal.platform.joint_limits import ANY, JointLimits, Region, beyond
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion, path
-from inercal.selfcal.platform.states import ALL
-from inercal.selfcal.settings import Search
+from inercal.foundation.errors import StudyError
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.left_out import left_out, shifts
+from inercal.systems.selfcal.before.path_design import design
+from inercal.systems.selfcal.before.path_search import criterion, search
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.coefficients import to_product
+from inercal.systems.selfcal.platform.joint_limits import ANY, JointLimits, Region, beyond
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.states import ALL
+from inercal.systems.selfcal.settings import Search
 
 D = np.pi / 180.0
 SLOW_OUTER = JointLimits(rate=(0.5 * D, 1.0 * D, 1.0 * D))
@@ -84,7 +84,7 @@ def limited():
 
 def test_the_path_found_keeps_every_limit(limited, monkeypatch):
     """A present plan that breaks two of them is judged, and refused to nobody but the simulation."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=2))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=2))
     made = design(limited)
     plan = made.plan
     angles, rates, accelerations = finely(plan)
@@ -110,7 +110,7 @@ def test_the_path_found_keeps_every_limit(limited, monkeypatch):
 
 def test_every_sequence_in_a_small_space_is_judged_alike(limited, monkeypatch):
     """Two turns of 90 deg that are then turned back, one joint slower than the other: the best of all is found."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
     asked = replace(limited.search, turns=4, angle=90.0 * D, rest=0.0, time=900.0)
     wide = replace(
         limited, search=asked, limits={"th_y": (0.0, 0.0)}, joints=JointLimits(rate=(1.0 * D,) * 3)
@@ -160,7 +160,7 @@ def test_shifts_by_errors_left_out_are_those_of_the_filter():
 
 def test_errors_left_out_count_in_the_criterion(monkeypatch):
     """The path found for both bound and errors beats, by both, the one found for the bound alone."""
-    monkeypatch.setattr("inercal.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
+    monkeypatch.setattr("inercal.systems.selfcal.before.path_search.LIMITS", replace(LIMITS, path_starts=6))
     asked = study("best", search=Search(turns=3, angle=60 * D, time=300.0, robust=("k2", "sag")))
 
     def judged(plan):

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from paper_study import study
 
-from inercal.estimate.factor import CHOLESKY, FACTORS, NEGATIVE, root
-from inercal.geometry.rotations import exp, multiply
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.filters import error_state, quaternion
-from inercal.selfcal.filters.problem import Start, problem
-from inercal.selfcal.platform.coefficients import to_linear
-from inercal.selfcal.platform.kinematics import attitude, joint_axes
-from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.settings import Filter, Gating
+from inercal.foundation.estimate.factor import CHOLESKY, FACTORS, NEGATIVE, root
+from inercal.foundation.geometry.rotations import exp, multiply
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.filters import error_state, quaternion
+from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.platform.coefficients import to_linear
+from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
+from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.settings import Filter, Gating
 
 #: a path on which all three joints turn, 431 rows
 MIXED = Plan((Turn("y", 0.5), Turn("z", -0.6), Turn("x", 0.4)), start=(0.3, -0.2, 0.1))

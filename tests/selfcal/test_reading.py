@@ -9,21 +9,21 @@ import pytest
 from numpy.testing import assert_allclose
 from paper_study import DEG, study
 
-from inercal.errors import RecordError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.inputs import Source
-from inercal.records.checks import check
-from inercal.records.column import Column
-from inercal.records.read import read
-from inercal.records.record import Record
-from inercal.records.write import SUFFIXES, write_record
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
-from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.reading import recording_of
-from inercal.selfcal.task import calibrate
-from inercal.units import parse_unit
+from inercal.foundation.errors import RecordError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.checks import check
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.read import read
+from inercal.foundation.records.record import Record
+from inercal.foundation.records.write import SUFFIXES, write_record
+from inercal.foundation.units import parse_unit
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.rig import Gimbals
+from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.task import calibrate
 
 # All three joints turn; 108 s.
 PLAN = Plan(

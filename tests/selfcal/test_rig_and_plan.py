@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from paper_study import DEG
 
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.kernels import exp, multiply, rotate
-from inercal.geometry.rotations import attitude_difference, elementary, from_matrix, to_matrix
-from inercal.geometry.site import Site
-from inercal.selfcal.filters.residuals import gimbals as all_gimbals
-from inercal.selfcal.platform.kinematics import all_angles, angles, attitude, joint_axes
-from inercal.selfcal.platform.model import propagate
-from inercal.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
-from inercal.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.kernels import exp, multiply, rotate
+from inercal.foundation.geometry.rotations import attitude_difference, elementary, from_matrix, to_matrix
+from inercal.foundation.geometry.site import Site
+from inercal.systems.selfcal.filters.residuals import gimbals as all_gimbals
+from inercal.systems.selfcal.platform.kinematics import all_angles, angles, attitude, joint_axes
+from inercal.systems.selfcal.platform.model import propagate
+from inercal.systems.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 
 LATITUDE = 40.0 * DEG
 SITE = Site(9.8, (), LATITUDE)

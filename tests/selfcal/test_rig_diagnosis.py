@@ -8,15 +8,15 @@ from independent import selfcal as platform
 from independent.selfcal import ARCSEC, DEG_H, PPM, THREE, UG, Drive, Faults, G
 
 import inercal as ic
-from inercal.estimate.hypotheses import slopes
-from inercal.records.read import read
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.diagnosis.fit_quality import JUDGE, filtered
-from inercal.selfcal.diagnosis.rig_errors import rig_errors
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.reading import recording_of
-from inercal.studies.load import load_selfcal_study
+from inercal.faces.studies.load import load_selfcal_study
+from inercal.foundation.estimate.hypotheses import slopes
+from inercal.foundation.records.read import read
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.diagnosis.fit_quality import JUDGE, filtered
+from inercal.systems.selfcal.diagnosis.rig_errors import rig_errors
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.reading import recording_of
 
 DRIVE = Drive(THREE, ramp=0.4)
 

@@ -5,7 +5,7 @@ import pytest
 from independent.selfcal import ARCSEC, DEG_H, PPM, THREE, UG, G, study
 
 import inercal as ic
-from inercal.errors import RecordError, StudyError
+from inercal.foundation.errors import RecordError, StudyError
 
 RIG = f"""
 [plan]
@@ -51,8 +51,8 @@ def test_what_has_no_temperature_is_refused(tmp_path):
 
 
 def test_a_stream_has_no_mean_temperature(tmp_path):
-    from inercal.selfcal.filters.problem import problem
-    from inercal.stream.selfcal import filter_of
+    from inercal.faces.stream.selfcal import filter_of
+    from inercal.systems.selfcal.filters.problem import problem
 
     asked = of_study(tmp_path / "s.toml", '["paper", "temperature"]')
     with pytest.raises(StudyError, match=r"model\.states: found temperature"):

@@ -9,15 +9,15 @@ from paper_study import ARCSEC, DEG, MICRO_G, study
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.considered import sensitivities
-from inercal.selfcal.filters.problem import encoders_at, problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform import linearised, model
-from inercal.selfcal.platform.coefficients import to_linear, to_product
-from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.platform.rig import Gimbals
-from inercal.selfcal.platform.states import (
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.considered import sensitivities
+from inercal.systems.selfcal.filters.problem import encoders_at, problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform import linearised, model
+from inercal.systems.selfcal.platform.coefficients import to_linear, to_product
+from inercal.systems.selfcal.platform.recording import Recording
+from inercal.systems.selfcal.platform.rig import Gimbals
+from inercal.systems.selfcal.platform.states import (
     ALL,
     BIAS_WALK,
     ENTRY_OF,
@@ -28,9 +28,9 @@ from inercal.selfcal.platform.states import (
     TEMPERATURE,
     WALK,
 )
-from inercal.selfcal.result.outcome import assemble
-from inercal.selfcal.settings import Model
-from inercal.selfcal.still_joints import still_joints, told_apart
+from inercal.systems.selfcal.result.outcome import assemble
+from inercal.systems.selfcal.settings import Model
+from inercal.systems.selfcal.still_joints import still_joints, told_apart
 
 WHOLE = (
     *RIG, "k2", "levers", "scale_asymmetry", "g_sensitivity", "sag", *TEMPERATURE, "harmonics", *BIAS_WALK,

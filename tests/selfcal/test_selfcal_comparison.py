@@ -7,23 +7,23 @@ import pytest
 from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
-from inercal.findings import Status
-from inercal.geometry.rotations import boxplus
-from inercal.geometry.site import GravityInput
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.figures import pictures
-from inercal.selfcal.figures.filters import changes_of_turn
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.plan import Plan, Rest, Turn
-from inercal.selfcal.result.comparison import (
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.rotations import boxplus
+from inercal.foundation.geometry.site import GravityInput
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.figures import pictures
+from inercal.systems.selfcal.figures.filters import changes_of_turn
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.result.comparison import (
     attitude_errors,
     beside,
     differing,
     stated_variance,
     with_stated,
 )
-from inercal.selfcal.task import calibrate, compared
+from inercal.systems.selfcal.task import calibrate, compared
 
 PLAIN = study("best")
 SHORT = Plan((Turn("z", 60 * DEG), Rest(10.0), Turn("x", -30 * DEG)))

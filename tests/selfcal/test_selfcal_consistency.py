@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from paper_study import TRUTH, study
 
-from inercal.estimate.executors import Threads
-from inercal.selfcal.monte_carlo import campaign
+from inercal.foundation.estimate.executors import Threads
+from inercal.systems.selfcal.monte_carlo import campaign
 
 SEED, FEW, RUNS = 20261121, 20, 100
 ALL = pytest.mark.campaign

@@ -11,27 +11,28 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 
-import inercal.selfcal.figures as drawn_by
-from inercal.estimate.basis import Basis
-from inercal.estimate.budget import TypeA, combine
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.geometry.rotations import exp, multiply, normalize
-from inercal.report import innovations as filtering
-from inercal.report.cells import Cell
-from inercal.report.coefficients import dots
-from inercal.report.courses import turning
-from inercal.selfcal.before.bounds import PathBounds
-from inercal.selfcal.before.observability import observability
-from inercal.selfcal.before.path_design import ComparedPath, DesignedPath
-from inercal.selfcal.figures.design import page as design_page
-from inercal.selfcal.figures.filters import attitude_errors
-from inercal.selfcal.figures.monte_carlo import page as campaign_page
-from inercal.selfcal.filters.filter_result import FilterResult, History
-from inercal.selfcal.filters.problem import FilterProblem
-from inercal.selfcal.filters.residuals import gimbals
-from inercal.selfcal.monte_carlo import Campaign
-from inercal.selfcal.platform.coefficients import (
+import inercal.systems.selfcal.figures as drawn_by
+from inercal.faces.report import innovations as filtering
+from inercal.faces.report.cells import Cell
+from inercal.faces.report.coefficients import dots
+from inercal.faces.report.courses import turning
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.budget import TypeA, combine
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.rotations import exp, multiply, normalize
+from inercal.foundation.units import parse_unit
+from inercal.systems.selfcal.before.bounds import PathBounds
+from inercal.systems.selfcal.before.observability import observability
+from inercal.systems.selfcal.before.path_design import ComparedPath, DesignedPath
+from inercal.systems.selfcal.figures.design import page as design_page
+from inercal.systems.selfcal.figures.filters import attitude_errors
+from inercal.systems.selfcal.figures.monte_carlo import page as campaign_page
+from inercal.systems.selfcal.filters.filter_result import FilterResult, History
+from inercal.systems.selfcal.filters.problem import FilterProblem
+from inercal.systems.selfcal.filters.residuals import gimbals
+from inercal.systems.selfcal.monte_carlo import Campaign
+from inercal.systems.selfcal.platform.coefficients import (
     names,
     product_slope,
     shown_units,
@@ -39,11 +40,10 @@ from inercal.selfcal.platform.coefficients import (
     to_product,
     units,
 )
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, path
-from inercal.selfcal.platform.recording import Recording
-from inercal.selfcal.result.tables import bounds_by_path, side_by_side, turns, weak_combinations
-from inercal.selfcal.task import Calibration
-from inercal.units import parse_unit
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.recording import Recording
+from inercal.systems.selfcal.result.tables import bounds_by_path, side_by_side, turns, weak_combinations
+from inercal.systems.selfcal.task import Calibration
 
 SHORT = Plan((Turn("z", np.radians(30.0)), Rest(5.0), Turn("x", np.radians(-20.0))))
 """55 s, 276 rows."""

@@ -9,14 +9,14 @@ from independent.selfcal_driven import Place, driven
 from scipy.stats import chi2
 
 import inercal as ic
-from inercal.errors import StudyError
-from inercal.records.record import Record
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
-from inercal.selfcal.reading import recording_of
-from inercal.selfcal.result.not_fitted import Evidence, of_all
-from inercal.selfcal.several import fit, parts_of, placed
+from inercal.foundation.errors import StudyError
+from inercal.foundation.records.record import Record
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import EXTENDED, to_linear
+from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.result.not_fitted import Evidence, of_all
+from inercal.systems.selfcal.several import fit, parts_of, placed
 
 ONE = Drive((("z", 360), ("z", -360)), rate=np.radians(2.0))
 PLACES = (

@@ -10,19 +10,26 @@ from paper_study import ARCSEC, DEG, PPM, TRUTH, study
 from scipy.integrate import solve_ivp
 from scipy.stats import chi2, kstest
 
-from inercal.errors import StudyError
-from inercal.geometry.rotations import attitude_difference, conjugate, exp, multiply, normalize, rotate
-from inercal.selfcal.before.simulate import experiment, flicker, simulate, to_record
-from inercal.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
-from inercal.selfcal.filters.residuals import gimbals
-from inercal.selfcal.platform import model
-from inercal.selfcal.platform.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
-from inercal.selfcal.platform.model import specific_force
-from inercal.selfcal.platform.plan import Plan, Rest, Turn, motion
-from inercal.selfcal.platform.rig import Base, Gimbals
-from inercal.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
-from inercal.selfcal.platform.truth import Truth, simulate_truth
-from inercal.selfcal.settings import Disturbances, Noise
+from inercal.foundation.errors import StudyError
+from inercal.foundation.geometry.rotations import (
+    attitude_difference,
+    conjugate,
+    exp,
+    multiply,
+    normalize,
+    rotate,
+)
+from inercal.systems.selfcal.before.simulate import experiment, flicker, simulate, to_record
+from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
+from inercal.systems.selfcal.filters.residuals import gimbals
+from inercal.systems.selfcal.platform import model
+from inercal.systems.selfcal.platform.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
+from inercal.systems.selfcal.platform.model import specific_force
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion
+from inercal.systems.selfcal.platform.rig import Base, Gimbals
+from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
+from inercal.systems.selfcal.platform.truth import Truth, simulate_truth
+from inercal.systems.selfcal.settings import Disturbances, Noise
 
 PLAN = Plan(
     (Turn("z", 60 * DEG), Turn("x", 90 * DEG), Turn("y", 40 * DEG), Rest(4.0)),

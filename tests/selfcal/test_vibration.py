@@ -7,10 +7,10 @@ from independent.selfcal_driven import Place, driven
 from scipy.stats import chi2
 
 import inercal as ic
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import EXTENDED, to_linear
-from inercal.selfcal.reading import recording_of
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import EXTENDED, to_linear
+from inercal.systems.selfcal.reading import recording_of
 
 IN_A_VEHICLE = Place(vibration=1000 * UG)
 STATED = 'vibration = "1000 ug"\nencoder'

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import GravityInput
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.simulate import experiment, simulate
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.diagnosis.fit_quality import filtered
-from inercal.selfcal.diagnosis.small import likely, small_errors
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.rig import Base
-from inercal.selfcal.result.outcome import assemble, verdict
-from inercal.selfcal.result.systematic import stated_errors, systematic_inputs
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import GravityInput
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.diagnosis.fit_quality import filtered
+from inercal.systems.selfcal.diagnosis.small import likely, small_errors
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.result.outcome import assemble, verdict
+from inercal.systems.selfcal.result.systematic import stated_errors, systematic_inputs
 
 PLAIN = study(path="best")
 PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)

@@ -8,23 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paper_study import ARCSEC, DEG, study
 
-from inercal.estimate.budget import combine
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput
-from inercal.selfcal.before.bounds import recorded_bounds
-from inercal.selfcal.before.observability import not_positive
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.diagnosis.examination import diagnose
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
-from inercal.selfcal.platform.plan import Plan, Turn
-from inercal.selfcal.result import budget as sources
-from inercal.selfcal.result.columns import history_record
-from inercal.selfcal.result.outcome import assemble
-from inercal.selfcal.result.systematic import stated_errors
-from inercal.selfcal.settings import Filter, Noise
-from inercal.selfcal.task import calibrate
+from inercal.foundation.estimate.budget import combine
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput
+from inercal.systems.selfcal.before.bounds import recorded_bounds
+from inercal.systems.selfcal.before.observability import not_positive
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
+from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.result import budget as sources
+from inercal.systems.selfcal.result.columns import history_record
+from inercal.systems.selfcal.result.outcome import assemble
+from inercal.systems.selfcal.result.systematic import stated_errors
+from inercal.systems.selfcal.settings import Filter, Noise
+from inercal.systems.selfcal.task import calibrate
 
 SHORT = study(plan=Plan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0))
 

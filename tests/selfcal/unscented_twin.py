@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from inercal.geometry.rotations import conjugate, exp, multiply, rotate
+from inercal.foundation.geometry.rotations import conjugate, exp, multiply, rotate
 
 
 def points(P):

@@ -7,8 +7,8 @@ matrices; variances are differences of such products. Angles and sizes are taken
 import mpmath as mp
 import numpy as np
 
-from inercal.rigs.chain import Error, Fixed, Joint
-from inercal.rigs.distribution import density, normal, triangular, two_point, uniform
+from inercal.foundation.rigs.chain import Error, Fixed, Joint
+from inercal.foundation.rigs.distribution import density, normal, triangular, two_point, uniform
 
 DIGITS = 60
 

@@ -8,14 +8,14 @@ from high_precision import KINDS, reference, relative
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.geometry.rotations import elementary
-from inercal.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
-from inercal.rigs.distribution import normal, two_point, uniform
-from inercal.rigs.outputs import Output, table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import averages
-from inercal.sensitivities.exact import analyse, closed_variance
+from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
+from inercal.foundation.rigs.distribution import normal, two_point, uniform
+from inercal.foundation.rigs.outputs import Output, table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import averages
+from inercal.foundation.sensitivities.exact import analyse, closed_variance
 
 ARCSEC = np.pi / 180.0 / 3600.0
 LATITUDE = np.radians(40.0)

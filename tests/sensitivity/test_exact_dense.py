@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from high_precision import KINDS
 
-from inercal.geometry.rotations import elementary
-from inercal.rigs.chain import Chain, Error, Fixed, Joint, Scope
-from inercal.rigs.distribution import density, normal, two_point, uniform
-from inercal.rigs.outputs import Output, gravity_reference, rate_reference
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import dense
+from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope
+from inercal.foundation.rigs.distribution import density, normal, two_point, uniform
+from inercal.foundation.rigs.outputs import Output, gravity_reference, rate_reference
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import dense
 
 ANGLES = np.array([[0.3, 1.1], [np.pi / 2, 0.0], [2.0, -0.4]])
 

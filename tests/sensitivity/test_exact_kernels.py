@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import inercal
-from inercal.geometry.rotations import elementary
-from inercal.rigs.distribution import density, normal, uniform
-from inercal.rigs.outputs import Output, table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import dense
-from inercal.sensitivities.exact import analyse, closed_variance
+from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.rigs.distribution import density, normal, uniform
+from inercal.foundation.rigs.outputs import Output, table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import dense
+from inercal.foundation.sensitivities.exact import analyse, closed_variance
 
 PACKAGE = Path(inercal.__file__).parent
 PARTS = ("variance", "bias", "first_variance", "interaction_variance", "shapley", "second_variance")
@@ -40,7 +40,7 @@ def rigs():
 
 @pytest.mark.parametrize("chain", list(rigs()), ids=["two axes", "three axes"])
 def test_compiled_and_plain_agree_to_rounding(chain):
-    """`inercal.sensitivities.dense` is written apart, with matrices in place of components."""
+    """`inercal.foundation.sensitivities.dense` is written apart, with matrices in place of components."""
     angles = np.random.default_rng(8).uniform(-np.pi, np.pi, (7, len(chain.joints)))
     found = analyse(chain, OUTPUTS, angles, shapley=True, second=True)
     plain_chain = dense.blocks(chain, angles, (1,))
@@ -76,11 +76,11 @@ def test_order_of_positions_and_threads_do_not_change_a_digit():
 
 PROGRAM = """
 import numpy as np
-from inercal.rigs.distribution import density
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import dense, kernels
-from inercal.sensitivities.exact import analyse
+from inercal.foundation.rigs.distribution import density
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import dense, kernels
+from inercal.foundation.sensitivities.exact import analyse
 chain = turntable("two_axis_turntable", density(lambda x: 1.0 + x, -0.3, 0.6), mounting=np.eye(3)[[1, 2, 0]])
 outputs, angles = table_outputs(("ax", "wy"), 9.8, 0.7), np.array([[0.3, 1.1], [0.3, 1.2], [2.0, 1.2]])
 """

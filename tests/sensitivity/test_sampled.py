@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from inercal.rigs.chain import Chain, Error, Joint, Scope
-from inercal.rigs.distribution import normal, uniform
-from inercal.rigs.outputs import table_outputs
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.sensitivities import averages, exact, sampled
-from inercal.sensitivities.sampled import estimate, evaluate
+from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
+from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.sensitivities import averages, exact, sampled
+from inercal.foundation.sensitivities.sampled import estimate, evaluate
 
 LAW = uniform(np.radians(2.0 / 60.0))
 TABLE = turntable("two_axis_turntable", LAW)

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.geometry.earth import gravity
-from inercal.geometry.site import Site
-from inercal.strapdown.batch import fit
-from inercal.strapdown.coefficients import SIZE, free_places
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.settings import TURN_NOISE, Noise, Plan, Prior, Rests, StrapdownSettings
-from inercal.strapdown.simulate import simulated
-from inercal.units import parse_quantity
+from inercal.foundation.geometry.earth import gravity
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.units import parse_quantity
+from inercal.systems.strapdown.batch import fit
+from inercal.systems.strapdown.coefficients import SIZE, free_places
+from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Plan, Prior, Rests, StrapdownSettings
+from inercal.systems.strapdown.simulate import simulated
 
 
 def si(text, dimension):

@@ -7,7 +7,7 @@ import pytest
 
 import inercal as ic
 from inercal.cli import run
-from inercal.findings import Status
+from inercal.foundation.findings import Status
 
 SITE = ["--set", "site.latitude=34 deg", "--set", "site.gravity=9.7965(1) m/s^2"]
 SHORT = ["--set", "plan.dwell=6 s", "--set", "plan.first_dwell=15 s", "--set", "plan.sample_rate=50 Hz"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import strapdown_faults as faults
 
-from inercal.findings import Status
+from inercal.foundation.findings import Status
 
 DRIFT = faults.CASES["drift of a gyro by force, 1 deg/h/g"]
 PER_G = faults.DPH / 9.80665

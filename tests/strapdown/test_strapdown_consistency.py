@@ -7,12 +7,12 @@ import pytest
 from grades import GRADES, MEMS, NAV, drawn, fitted, u_by_kind
 from scipy.stats import chi2, norm
 
-from inercal.strapdown.averaged import opened
-from inercal.strapdown.batch import fit
-from inercal.strapdown.restricted import residuals, with_noise_shown
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.settings import ESTIMABLE, Motion
-from inercal.strapdown.simulate import simulated
+from inercal.systems.strapdown.averaged import opened
+from inercal.systems.strapdown.batch import fit
+from inercal.systems.strapdown.restricted import residuals, with_noise_shown
+from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.settings import ESTIMABLE, Motion
+from inercal.systems.strapdown.simulate import simulated
 
 RISK = 1e-3
 

@@ -10,14 +10,14 @@ from grades import GRADES, NAV, fitted, plan, u_by_kind
 
 import inercal as ic
 from inercal.cli import run
-from inercal.designs.search import improved
-from inercal.errors import InputError, StudyError
-from inercal.strapdown.bounds import Pieces, bounds
-from inercal.strapdown.coefficients import SIZE
-from inercal.strapdown.design import NINETEEN, angles_of, by_kind, design
-from inercal.strapdown.path_search import TurnGround, attitudes
-from inercal.strapdown.settings import Design, Goal, Plan
-from inercal.strapdown.simulate import start_attitude
+from inercal.foundation.designs.search import improved
+from inercal.foundation.errors import InputError, StudyError
+from inercal.systems.strapdown.bounds import Pieces, bounds
+from inercal.systems.strapdown.coefficients import SIZE
+from inercal.systems.strapdown.design import NINETEEN, angles_of, by_kind, design
+from inercal.systems.strapdown.path_search import TurnGround, attitudes
+from inercal.systems.strapdown.settings import Design, Goal, Plan
+from inercal.systems.strapdown.simulate import start_attitude
 
 LEVEL = (0.0, 0.0, 0.0)
 
@@ -217,7 +217,7 @@ def test_what_cannot_be_designed_is_said(folder):
 def test_the_named_path_visits_19_positions():
     seen = [start_attitude(plan())]
     for axis, angle in NINETEEN:
-        from inercal.geometry.rotations import elementary
+        from inercal.foundation.geometry.rotations import elementary
 
         seen.append(seen[-1] @ elementary("xyz"[axis], angle))
     assert len(seen) == 19

@@ -10,7 +10,7 @@ import pytest
 import strapdown_faults as faults
 from scipy.stats import chi2
 
-from inercal.findings import Status
+from inercal.foundation.findings import Status
 
 
 def result_of(name, seed=0):

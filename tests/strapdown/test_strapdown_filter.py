@@ -11,11 +11,11 @@ from grades import GRADES, drawn
 import inercal as ic
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.strapdown.batch import fit
-from inercal.strapdown.error_state import filtered, measured, predicted
-from inercal.strapdown.reading import evened
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.simulate import simulated
+from inercal.systems.strapdown.batch import fit
+from inercal.systems.strapdown.error_state import filtered, measured, predicted
+from inercal.systems.strapdown.reading import evened
+from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.simulate import simulated
 
 
 def both(grade, seed, rate=50.0):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from grades import GRADES, MEMS, NAV, TACTICAL, drawn, plan
 
-from inercal.geometry.rotations import conjugate, exp, from_matrix, log, multiply
-from inercal.strapdown.batch import empty_shot, fit, variances_of, world_of
-from inercal.strapdown.coefficients import (
+from inercal.foundation.geometry.rotations import conjugate, exp, from_matrix, log, multiply
+from inercal.systems.strapdown.batch import empty_shot, fit, variances_of, world_of
+from inercal.systems.strapdown.coefficients import (
     GRAVITY,
     KA,
     LATITUDE,
@@ -25,13 +25,13 @@ from inercal.strapdown.coefficients import (
     slope,
     stated,
 )
-from inercal.strapdown.delay import delayed
-from inercal.strapdown.kernels import State, shoot
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.samples import Samples, freed, gains
-from inercal.strapdown.settings import Motion
-from inercal.strapdown.simulate import _turns, simulated, truth
-from inercal.strapdown.start import beginning, carried_through
+from inercal.systems.strapdown.delay import delayed
+from inercal.systems.strapdown.kernels import State, shoot
+from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.samples import Samples, freed, gains
+from inercal.systems.strapdown.settings import Motion
+from inercal.systems.strapdown.simulate import _turns, simulated, truth
+from inercal.systems.strapdown.start import beginning, carried_through
 
 SHORT = replace(
     TACTICAL,

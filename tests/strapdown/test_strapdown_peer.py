@@ -5,8 +5,8 @@ import pytest
 
 import inercal as ic
 from inercal.examples import FOLDER
-from inercal.findings import Status
-from inercal.units import parse_unit
+from inercal.foundation.findings import Status
+from inercal.foundation.units import parse_unit
 
 DEG_PER_H, SECOND = np.radians(1.0) / 3600.0, np.radians(1.0) / 3600.0
 UG = 1e-6 * 9.7803267715

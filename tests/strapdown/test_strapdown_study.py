@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from new_studies import filled, load_turntable_study
 
-from inercal.errors import StudyError
-from inercal.strapdown.settings import ESTIMABLE
-from inercal.studies.load import load_imu_study, load_strapdown_study
-from inercal.studies.strapdown import strapdown_study
+from inercal.faces.studies.load import load_imu_study, load_strapdown_study
+from inercal.faces.studies.strapdown import strapdown_study
+from inercal.foundation.errors import StudyError
+from inercal.systems.strapdown.settings import ESTIMABLE
 from rows import for_each
 
 LEAST = """

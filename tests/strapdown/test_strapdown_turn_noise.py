@@ -9,14 +9,14 @@ from grades import MEMS, TACTICAL, drawn
 from scipy.stats import chi2
 
 import inercal as ic
-from inercal.findings import Status
-from inercal.strapdown.averaged import opened
-from inercal.strapdown.batch import fit
-from inercal.strapdown.restricted import separated, solved, with_noise
-from inercal.strapdown.rests import found_rests, nodes_of
-from inercal.strapdown.settings import TURN_NOISE, WALKS
-from inercal.strapdown.simulate import simulated, to_record
-from inercal.strapdown.task import calibrate
+from inercal.foundation.findings import Status
+from inercal.systems.strapdown.averaged import opened
+from inercal.systems.strapdown.batch import fit
+from inercal.systems.strapdown.restricted import separated, solved, with_noise
+from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.settings import TURN_NOISE, WALKS
+from inercal.systems.strapdown.simulate import simulated, to_record
+from inercal.systems.strapdown.task import calibrate
 
 
 def run(settings, seed):

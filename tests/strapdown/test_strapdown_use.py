@@ -26,12 +26,12 @@ def folder(tmp_path_factory):
     plan += ["--set", "plan.sample_rate=200 Hz", "--set", "motion.wobble=3 deg", "--set", TERMS]
     assert run(["new", "strapdown", "--out", study, "--quiet", *SITE, *plan]) == 0
     settings = ic.study(study, truth=TRUTH).settings
-    from inercal.strapdown.coefficients import SIZE, array_of
-    from inercal.strapdown.simulate import simulated, to_record
+    from inercal.systems.strapdown.coefficients import SIZE, array_of
+    from inercal.systems.strapdown.simulate import simulated, to_record
 
     pairs = (("run", array_of(settings.truth, "upper")), ("true", np.zeros(SIZE)))
     for name, c in pairs:
-        from inercal.records.write import write_record
+        from inercal.foundation.records.write import write_record
 
         samples = simulated(settings, c, np.random.default_rng(7), noise=False)
         write_record(to_record(samples), path / f"{name}.csv")

@@ -1,6 +1,6 @@
 """Estimators on streams that break off, for the tests of this folder."""
 
-from inercal.stream.run import run
+from inercal.faces.stream.run import run
 
 
 def lines_out(estimator, lines, saving=None, kill=None):

@@ -9,18 +9,18 @@ from independent.aoa import CASES, DEG, Tunnel, simulate
 from sting_study import study
 from streams_that_break import lines_out
 
-from inercal.aoa.alarm import Alarm
-from inercal.aoa.band import Band
-from inercal.aoa.fusion.band import with_rate
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.fusion.watch import watched
-from inercal.aoa.reading.recording import plain
-from inercal.aoa.settings import Estimator
-from inercal.records.write import number
-from inercal.stream.aoa import Aoa
-from inercal.stream.lines import Lines
-from inercal.stream.run import Saving
+from inercal.faces.stream.aoa import Aoa
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import Saving
+from inercal.foundation.records.write import number
+from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.fusion.band import with_rate
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.fusion.watch import watched
+from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.settings import Estimator
 
 LINES_OF_TUNNEL = "lines 0.05 g, 47, 112, 230 Hz"
 

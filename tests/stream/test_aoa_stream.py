@@ -9,26 +9,26 @@ import pytest
 from sting_study import BASE, DEG, G, study
 from streams_that_break import lines_out
 
-from inercal.aoa.band import Band
-from inercal.aoa.disturbances import Disturbances, Oscillation
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.reading.from_record import recording_of
-from inercal.aoa.reading.wind_off_zero import with_zero
-from inercal.aoa.result.columns import angles_record
-from inercal.aoa.result.systematic import by_fusion
-from inercal.aoa.settings import Attitude, Calibration, Estimator, Timing, Zero
-from inercal.aoa.simulate import simulate, to_record
-from inercal.aoa.task import measure
-from inercal.errors import InputError, RecordError, StudyError
-from inercal.estimate.checkpoint import fingerprint
-from inercal.estimate.files import save
-from inercal.records.read import read
-from inercal.records.write import write_record
-from inercal.stream.aoa import Aoa
-from inercal.stream.lines import Lines
-from inercal.stream.run import Saving
-from inercal.units import parse_quantity, parse_unit
+from inercal.faces.stream.aoa import Aoa
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import Saving
+from inercal.foundation.errors import InputError, RecordError, StudyError
+from inercal.foundation.estimate.checkpoint import fingerprint
+from inercal.foundation.estimate.files import save
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
+from inercal.foundation.units import parse_quantity, parse_unit
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.reading.from_record import recording_of
+from inercal.systems.aoa.reading.wind_off_zero import with_zero
+from inercal.systems.aoa.result.columns import angles_record
+from inercal.systems.aoa.result.systematic import by_fusion
+from inercal.systems.aoa.settings import Attitude, Calibration, Estimator, Timing, Zero
+from inercal.systems.aoa.simulate import simulate, to_record
+from inercal.systems.aoa.task import measure
 
 SHORT = replace(BASE, duration=0.6)
 LONG = replace(BASE, duration=4.2, sample_rate=500.0)
@@ -149,7 +149,7 @@ def test_gyros_for_roll_and_yaw_are_used(tmp_path):
 @pytest.mark.parametrize("block", [37, 10_000])
 def test_with_them_alpha_and_beta_are_those_of_the_tracked_roll(block, tmp_path, monkeypatch):
     """To the digit, and off by degrees from those of the stated roll: the model rolls by 2 deg while it is measured."""
-    monkeypatch.setattr("inercal.aoa.fusion.filter_result._BLOCK", block)
+    monkeypatch.setattr("inercal.systems.aoa.fusion.filter_result._BLOCK", block)
     rolling = Disturbances(roll=Oscillation(2.0 * DEG, 6.0), yaw=Oscillation(1.0 * DEG, 8.0))
     settings = study(motion=SHORT, disturbances=rolling, attitude=ROLLED)
     text = recorded(tmp_path, settings, 4, flawed)

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError, MapError, RecordError
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.stream.doubt import Doubt, HeldRows
-from inercal.stream.lines import Lines
+from inercal.faces.stream.doubt import Doubt, HeldRows
+from inercal.faces.stream.lines import Lines
+from inercal.foundation.errors import InputError, MapError, RecordError
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
 from rows import for_each
 
 HEADER = "t [s],acc_x [g],gyro_x [deg/s]\n"

@@ -6,13 +6,13 @@ import io
 import numpy as np
 import pytest
 
-from inercal.errors import InputError
-from inercal.imu.limits import LIMITS
-from inercal.noise.dwell_means import overlapping_variance, running_sums
-from inercal.records.dwells import static_intervals, windowed_variance
-from inercal.stream.lines import Lines
-from inercal.stream.monitor import Monitor
-from inercal.stream.run import Saving, run
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.monitor import Monitor
+from inercal.faces.stream.run import Saving, run
+from inercal.foundation.errors import InputError
+from inercal.foundation.noise.dwell_means import overlapping_variance, running_sums
+from inercal.foundation.records.dwells import static_intervals, windowed_variance
+from inercal.systems.imu.limits import LIMITS
 
 HEADER = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]\n"
 RATE, WINDOW = 50.0, 51

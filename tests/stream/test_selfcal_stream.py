@@ -9,22 +9,22 @@ from numpy.testing import assert_allclose
 from paper_study import TRUTH, study
 from streams_that_break import lines_out
 
-from inercal.errors import InputError, RecordError, StudyError
-from inercal.records.maps import read_map
-from inercal.records.read import read
-from inercal.records.write import write_record
-from inercal.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.selfcal.filters.filter_result import product_form
-from inercal.selfcal.filters.problem import problem
-from inercal.selfcal.filters.run import estimate
-from inercal.selfcal.platform.coefficients import KA1, names
-from inercal.selfcal.platform.plan import Plan, Rest, Turn
-from inercal.selfcal.reading import recording_of
-from inercal.selfcal.result.columns import history_record
-from inercal.selfcal.settings import Disturbances, Filter, Gating
-from inercal.stream.lines import Lines
-from inercal.stream.run import Saving, run
-from inercal.stream.selfcal import Selfcal
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import Saving, run
+from inercal.faces.stream.selfcal import Selfcal
+from inercal.foundation.errors import InputError, RecordError, StudyError
+from inercal.foundation.records.maps import read_map
+from inercal.foundation.records.read import read
+from inercal.foundation.records.write import write_record
+from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.filters.filter_result import product_form
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.platform.coefficients import KA1, names
+from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.result.columns import history_record
+from inercal.systems.selfcal.settings import Disturbances, Filter, Gating
 
 DEG = np.pi / 180.0
 RECURSIVE = ("error-state", "svd-qukf", "gimbal-ukf")
@@ -320,7 +320,7 @@ def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
         replace(base, filter=Filter(gating=Gating("two"))),
         replace(base, base=replace(base.base, heading=0.1)),
     ]
-    from inercal.estimate.checkpoint import fingerprint
+    from inercal.foundation.estimate.checkpoint import fingerprint
 
     marks = {fingerprint(Selfcal(lines, problem(each)).settings) for each in (base, *others)}
     assert len(marks) == 1 + len(others)

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
-from inercal.stream.lines import Lines
-from inercal.stream.run import Saving, run
+from inercal.faces.stream.lines import Lines
+from inercal.faces.stream.run import Saving, run
+from inercal.foundation.errors import InputError
 
 HEADER = "t [s],acc_x [g]\n"
 

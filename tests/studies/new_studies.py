@@ -2,8 +2,8 @@
 
 from functools import partial
 
-from inercal.studies.load import load_study
-from inercal.studies.template import template
+from inercal.faces.studies.load import load_study
+from inercal.faces.studies.template import template
 from inercal.systems.listed import SYSTEMS
 
 SITE = ("site.latitude=45(26) deg", "site.height=0(300) m")

@@ -5,11 +5,11 @@ from typing import get_args, get_type_hints
 
 import numpy as np
 
-from inercal.geometry.earth import gravity
-from inercal.geometry.site import Site
-from inercal.selfcal.before.bounds import bounds
-from inercal.selfcal.platform.plan import path as named_path
-from inercal.selfcal.settings import Gating, Noise, SelfcalSettings
+from inercal.foundation.geometry.earth import gravity
+from inercal.foundation.geometry.site import Site
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.platform.plan import path as named_path
+from inercal.systems.selfcal.settings import Gating, Noise, SelfcalSettings
 
 DEG = np.pi / 180.0
 PER_HOUR = DEG / 3600.0

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from sting_study import DEG, clipped, scenario, study
 
-from inercal.aoa.fusion.filter_result import estimate
-from inercal.aoa.fusion.problem import problem
-from inercal.aoa.paper.methods import low_passed, measure
-from inercal.aoa.settings import Methods, MotionPlan
-from inercal.aoa.simulate import simulate
+from inercal.systems.aoa.fusion.filter_result import estimate
+from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.paper.methods import low_passed, measure
+from inercal.systems.aoa.settings import Methods, MotionPlan
+from inercal.systems.aoa.simulate import simulate
 
 FILTERS = ("causal 8", "smoothed 8", "causal 19", "smoothed 19")
 PAPER, LOW_PASSED = "paper's method", "paper's method, low-passed offline"

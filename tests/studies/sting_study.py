@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.aoa.disturbances import Disturbances, Shaking
-from inercal.aoa.layout import Layout
-from inercal.aoa.settings import AoaSettings, Calibration, Estimator, MotionPlan, Noise
-from inercal.geometry.site import Site
+from inercal.foundation.geometry.site import Site
+from inercal.systems.aoa.disturbances import Disturbances, Shaking
+from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.settings import AoaSettings, Calibration, Estimator, MotionPlan, Noise
 
 G = 9.80665
 DEG = math.pi / 180.0

@@ -7,10 +7,10 @@ from dataclasses import fields, is_dataclass
 import numpy as np
 from numpy.testing import assert_allclose
 
-from inercal.estimate.files import save
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.studies.aoa import aoa_study
+from inercal.faces.studies.aoa import aoa_study
+from inercal.foundation.estimate.files import save
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
 
 # The study of the interface description, to the letter.
 CONTRACT = """

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import Site
-from inercal.instruments.by_angle import CHANNELS, EXTRA, channel_model
-from inercal.rigs.distribution import uniform
-from inercal.rigs.plans import grid, named
-from inercal.rigs.tables import turntable
-from inercal.turntable.settings import Design, Instrument, TurntableSettings
-from inercal.units import parse_unit
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.plans import grid, named
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.settings import Design, Instrument, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 DEG_H = parse_unit("deg/h").factor

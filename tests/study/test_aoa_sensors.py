@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose
 from sting_study import DEG, G
 from sting_text import calibrated, same, study, with_sensor
 
-from inercal.aoa.settings import Calibration
-from inercal.errors import InputError, StudyError
-from inercal.studies.schema import json_schema
-from inercal.studies.sensors import MOST
+from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.sensors import MOST
+from inercal.foundation.errors import InputError, StudyError
+from inercal.systems.aoa.settings import Calibration
 from rows import for_each
 
 SCHEMA = json_schema()

@@ -11,16 +11,24 @@ from new_studies import load_turntable_study
 from sting_study import DEG, SCENARIOS, G, scenario
 from sting_text import CONTRACT, WRITTEN, calibrated, same, study
 
-from inercal.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Oscillation, Plunge, Shaking
-from inercal.aoa.settings import AoaSettings, Calibration, Estimator, Methods, MotionPlan, Prior, Zero
-from inercal.errors import StudyError
-from inercal.studies.load import (
+from inercal.faces.studies.load import (
     files_of,
     load_aoa_study,
     load_imu_study,
     load_selfcal_study,
 )
-from inercal.studies.schema import json_schema
+from inercal.faces.studies.schema import json_schema
+from inercal.foundation.errors import StudyError
+from inercal.systems.aoa.disturbances import (
+    AngleShaking,
+    Disturbances,
+    Line,
+    Mains,
+    Oscillation,
+    Plunge,
+    Shaking,
+)
+from inercal.systems.aoa.settings import AoaSettings, Calibration, Estimator, Methods, MotionPlan, Prior, Zero
 from rows import for_each
 
 SCHEMA = json_schema()

@@ -13,13 +13,13 @@ from new_studies import filled
 from sting_study import DEG, scenario
 from sting_text import same
 
-from inercal.aoa.settings import (
+from inercal.faces.studies.aoa import aoa_study
+from inercal.faces.studies.motion import _KEYS
+from inercal.faces.studies.schema import json_schema
+from inercal.foundation.errors import StudyError
+from inercal.systems.aoa.settings import (
     Zero,
 )
-from inercal.errors import StudyError
-from inercal.studies.aoa import aoa_study
-from inercal.studies.motion import _KEYS
-from inercal.studies.schema import json_schema
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from new_studies import filled
 
-from inercal.errors import StudyError
-from inercal.imu.settings import ImuSettings
-from inercal.studies.imu import imu_study
-from inercal.studies.load import load_imu_study
+from inercal.faces.studies.imu import imu_study
+from inercal.faces.studies.load import load_imu_study
+from inercal.foundation.errors import StudyError
+from inercal.systems.imu.settings import ImuSettings
 from rows import for_each
 
 RELAXED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)

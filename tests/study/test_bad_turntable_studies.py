@@ -7,9 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from new_studies import filled, load_turntable_study
 
-from inercal.errors import StudyError
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.settings import TurntableSettings
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
+from inercal.systems.turntable.settings import TurntableSettings
 from rows import for_each
 
 RELAXED = settings(

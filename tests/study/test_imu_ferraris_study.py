@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from inercal._toml import check
-from inercal.errors import StudyError
-from inercal.imu.settings import FerrarisSettings
-from inercal.studies.ferraris import FerrarisTable, ferraris_settings
+from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
+from inercal.foundation._toml import check
+from inercal.foundation.errors import StudyError
+from inercal.systems.imu.settings import FerrarisSettings
 from rows import for_each
 
 

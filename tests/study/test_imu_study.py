@@ -6,11 +6,11 @@ import math
 import pytest
 from numpy.testing import assert_allclose
 
-from inercal.errors import StudyError
-from inercal.geometry.earth import gravity
-from inercal.studies.common import GRAVITY_ANOMALY, UNSTATED_HEIGHT
-from inercal.studies.imu import imu_study
-from inercal.studies.load import load_imu_study
+from inercal.faces.studies.common import GRAVITY_ANOMALY, UNSTATED_HEIGHT
+from inercal.faces.studies.imu import imu_study
+from inercal.faces.studies.load import load_imu_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.geometry.earth import gravity
 from rows import for_each
 
 FULL = """

@@ -7,11 +7,11 @@ from typing import Literal
 
 import pytest
 
-from inercal._toml import Strict, check
-from inercal.errors import StudyError
-from inercal.keys import REQUIRED, TIME, keys_of, option, quantities, quantity, within
-from inercal.studies.tables import Stated, as_typed, settings_of, table_of
-from inercal.units import Quantity
+from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
+from inercal.foundation._toml import Strict, check
+from inercal.foundation.errors import StudyError
+from inercal.foundation.keys import REQUIRED, TIME, keys_of, option, quantities, quantity, within
+from inercal.foundation.units import Quantity
 
 ACUTE = within(0.0, 0.5 * math.pi, "an angle from 0 to 90 deg")
 

@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from inercal.errors import InputError, StudyError
-from inercal.studies.text import changed, toml
+from inercal.faces.studies.text import changed, toml
+from inercal.foundation.errors import InputError, StudyError
 
 
 def test_a_key_keeps_its_comment_and_its_place():

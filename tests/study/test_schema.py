@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from inercal.errors import StudyError
-from inercal.studies.imu import imu_study
-from inercal.studies.schema import json_schema
-from inercal.studies.starting import DISTRIBUTIONS
-from inercal.units import _TABLE, parse_unit
+from inercal.faces.studies.imu import imu_study
+from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.starting import DISTRIBUTIONS
+from inercal.foundation.errors import StudyError
+from inercal.foundation.units import _TABLE, parse_unit
 from rows import for_each
 
 SCHEMA = json_schema()

@@ -16,18 +16,26 @@ from new_studies import filled, load_turntable_study
 from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, NOISE, PER_HOUR, PPM, PRIOR, TRUTH
 
-from inercal.errors import StudyError
-from inercal.instruments.terms import term
-from inercal.selfcal.before.path_design import design
-from inercal.selfcal.before.simulate import experiment
-from inercal.selfcal.estimators import KINDS
-from inercal.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
-from inercal.selfcal.platform.plan import PATHS, Rest, Turn, path
-from inercal.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, PAPER, RIG, STATES, TEMPERATURE
-from inercal.selfcal.settings import Gating
-from inercal.studies.load import load_imu_study, load_selfcal_study
-from inercal.studies.schema import json_schema
-from inercal.studies.selfcal import selfcal_study
+from inercal.faces.studies.load import load_imu_study, load_selfcal_study
+from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.selfcal import selfcal_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.instruments.terms import term
+from inercal.systems.selfcal.before.path_design import design
+from inercal.systems.selfcal.before.simulate import experiment
+from inercal.systems.selfcal.estimators import KINDS
+from inercal.systems.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
+from inercal.systems.selfcal.platform.plan import PATHS, Rest, Turn, path
+from inercal.systems.selfcal.platform.states import (
+    ALL,
+    BIAS_WALK,
+    EXTENDED_MODEL,
+    PAPER,
+    RIG,
+    STATES,
+    TEMPERATURE,
+)
+from inercal.systems.selfcal.settings import Gating
 
 # The study of the interface description, to the letter.
 CONTRACT = """

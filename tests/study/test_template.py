@@ -11,19 +11,19 @@ from jsonschema import Draft202012Validator
 from new_studies import filled
 from sting_text import calibrated
 
-from inercal.errors import StudyError
-from inercal.rigs.tables import slots
-from inercal.studies.aoa import aoa_study
-from inercal.studies.imu import imu_study
-from inercal.studies.load import load_study
-from inercal.studies.schema import json_schema
-from inercal.studies.selfcal import selfcal_study
-from inercal.studies.starting import PATHS, POSITIONS
-from inercal.studies.strapdown import strapdown_study
-from inercal.studies.template import template
-from inercal.studies.turntable import turntable_study
+from inercal.faces.studies.aoa import aoa_study
+from inercal.faces.studies.imu import imu_study
+from inercal.faces.studies.load import load_study
+from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.selfcal import selfcal_study
+from inercal.faces.studies.starting import PATHS, POSITIONS
+from inercal.faces.studies.strapdown import strapdown_study
+from inercal.faces.studies.template import template
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.rigs.tables import slots
+from inercal.foundation.units import parse_unit
 from inercal.systems.listed import SYSTEMS
-from inercal.units import parse_unit
 
 KEY = re.compile(r"(?:# )?(\w+) = (.*\S) +# (.+)")
 SCHEMA = json_schema()

@@ -11,14 +11,14 @@ import pytest
 from new_studies import load_turntable_study
 from numpy.testing import assert_allclose
 
-from inercal.errors import StudyError
-from inercal.geometry.earth import gravity
-from inercal.rigs.chain import Scope
-from inercal.rigs.plans import grid, named
-from inercal.rigs.tables import slots
-from inercal.studies.load import files_of, load_imu_study
-from inercal.studies.turntable import turntable_study
-from inercal.units import STANDARD_GRAVITY
+from inercal.faces.studies.load import files_of, load_imu_study
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.geometry.earth import gravity
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.plans import grid, named
+from inercal.foundation.rigs.tables import slots
+from inercal.foundation.units import STANDARD_GRAVITY
 from rows import for_each
 
 ARCMIN = math.radians(1.0 / 60.0)

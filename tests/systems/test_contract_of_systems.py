@@ -11,19 +11,19 @@ from jsonschema import Draft202012Validator
 from new_studies import filled
 
 import inercal as ic
+from inercal.bench.live.estimators import of_study
+from inercal.bench.workbench.plans import lines_of, named, with_lines
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
-from inercal.errors import InputError, StudyError
-from inercal.face.study import kind_of, read_study
-from inercal.findings import Status
-from inercal.live.estimators import of_study
-from inercal.records.write import write_record
-from inercal.stream import run as stream
-from inercal.stream.lines import Lines
-from inercal.studies.schema import json_schema
-from inercal.studies.text import parsed, with_keys
+from inercal.faces.python.study import kind_of, read_study
+from inercal.faces.stream import run as stream
+from inercal.faces.stream.lines import Lines
+from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.text import parsed, with_keys
+from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.records.write import write_record
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench.plans import lines_of, named, with_lines
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("undrawn")]
 

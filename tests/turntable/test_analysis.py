@@ -8,11 +8,11 @@ import pytest
 import xarray
 from numpy.testing import assert_allclose
 
-from inercal.errors import StudyError
-from inercal.estimate.files import plain_objects
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.sensitivity.analysis import analyse, result, table
-from inercal.turntable.sensitivity.maps import write_maps
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.estimate.files import plain_objects
+from inercal.systems.turntable.sensitivity.analysis import analyse, result, table
+from inercal.systems.turntable.sensitivity.maps import write_maps
 
 FACTORS = [
     "dphi_y1", "dalpha_x1", "dalpha_z1", "deps_x", "deps_y", "dphi_z2",

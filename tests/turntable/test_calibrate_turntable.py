@@ -19,16 +19,16 @@ from turntable_studies import (
     usual_terms,
 )
 
-from inercal.errors import CalibrationError, StudyError
-from inercal.estimate.files import from_json, to_json
-from inercal.findings import Status
-from inercal.geometry.site import GravityInput, Site
-from inercal.records.column import Column
-from inercal.rigs.chain import Scope
-from inercal.rigs.plans import grid, listed, named
-from inercal.turntable.positions.simulate import simulate
-from inercal.turntable.task import calibrate
-from inercal.units import parse_unit
+from inercal.foundation.errors import CalibrationError, StudyError
+from inercal.foundation.estimate.files import from_json, to_json
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.records.column import Column
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.plans import grid, listed, named
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.task import calibrate
 
 NOISE = 0.01 * DEG_H
 ACCELEROMETERS = {f"K1_{i}": 1.0 for i in "xyz"} | {

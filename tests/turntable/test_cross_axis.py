@@ -8,16 +8,16 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 from turntable_studies import LATITUDE, study
 
-from inercal.convert.models import worth_knowing
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.records.record import record_of
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.turntable.rate.cross_axis import axis_about
-from inercal.turntable.settings import RateTest
-from inercal.turntable.task import calibrate
-from inercal.units import parse_unit
+from inercal.faces.convert.models import worth_knowing
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.rate.cross_axis import axis_about
+from inercal.systems.turntable.settings import RateTest
+from inercal.systems.turntable.task import calibrate
 
 DEG = np.pi / 180.0
 ARCSEC = DEG / 3600.0

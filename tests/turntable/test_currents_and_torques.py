@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from turntable_studies import DEG_H, GRAVITY, LATITUDE, references, study
 
-from inercal.convert.correction import apply_to
-from inercal.convert.models import model_of
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.records.channels import misfit
-from inercal.records.record import record_of
-from inercal.rigs.plans import grid, named
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.positions.calibration import calibrate_positions
-from inercal.turntable.settings import RateTest
-from inercal.turntable.task import calibrate
-from inercal.units import STANDARD_GRAVITY, parse_unit
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.models import model_of
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.records.channels import misfit
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.plans import grid, named
+from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
+from inercal.systems.turntable.positions.calibration import calibrate_positions
+from inercal.systems.turntable.settings import RateTest
+from inercal.systems.turntable.task import calibrate
 
 PLAN = grid((6, 6))
 PER_RATE = 1e-4 / DEG_H  # 0.1 mA/(deg/h), in A/(rad/s)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study
 
-from inercal.geometry.site import Site
-from inercal.instruments.polynomial import ChannelModel
-from inercal.rigs.plans import grid
-from inercal.turntable.positions.examination import Examination, examine, f_test
-from inercal.turntable.positions.faults import approach
-from inercal.turntable.positions.shifts import Scale, doubts
-from inercal.turntable.task import calibrate, simulate
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.rigs.plans import grid
+from inercal.systems.turntable.positions.examination import Examination, examine, f_test
+from inercal.systems.turntable.positions.faults import approach
+from inercal.systems.turntable.positions.shifts import Scale, doubts
+from inercal.systems.turntable.task import calibrate, simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "independent"))
 

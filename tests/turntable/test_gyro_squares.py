@@ -7,17 +7,17 @@ import pytest
 from new_studies import load_turntable_study
 from turntable_studies import DEG_H, GRAVITY, LATITUDE, references, study, u_without_doubts
 
-from inercal.convert.correction import apply_to
-from inercal.convert.models import model_of
-from inercal.errors import StudyError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.records.record import record_of
-from inercal.rigs.plans import grid
-from inercal.turntable.positions.calibration import calibrate_positions
-from inercal.turntable.settings import RateTest
-from inercal.turntable.task import simulate
-from inercal.units import STANDARD_GRAVITY, parse_unit
+from inercal.faces.convert.correction import apply_to
+from inercal.faces.convert.models import model_of
+from inercal.foundation.errors import StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
+from inercal.systems.turntable.positions.calibration import calibrate_positions
+from inercal.systems.turntable.settings import RateTest
+from inercal.systems.turntable.task import simulate
 
 PLAN = grid((6, 6))
 PRODUCTS = ("xx", "yy", "xy", "xz", "yz")

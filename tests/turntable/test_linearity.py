@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.estimate.result import COVERAGE
-from inercal.geometry.site import Site
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.rigs.plans import named
-from inercal.rigs.tables import turntable
-from inercal.turntable.rate.calibration import calibrate_rates
-from inercal.turntable.rate.linearity import Deviations, largest
-from inercal.turntable.settings import Design, Instrument, RateTest, TurntableSettings
-from inercal.units import parse_unit
+from inercal.foundation.estimate.result import COVERAGE
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.rigs.plans import named
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.rate.calibration import calibrate_rates
+from inercal.systems.turntable.rate.linearity import Deviations, largest
+from inercal.systems.turntable.settings import Design, Instrument, RateTest, TurntableSettings
 
 EARTH = 7.292115e-5
 LATITUDE = np.radians(39.1)

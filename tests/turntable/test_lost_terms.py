@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from turntable_studies import ARCMIN, DEG_H, study, table
 
-from inercal.findings import Status
-from inercal.instruments.by_angle import channel_model
-from inercal.rigs.distribution import uniform
-from inercal.rigs.plans import grid, listed
-from inercal.rigs.tables import turntable
-from inercal.turntable.model import table_model
-from inercal.turntable.positions.planning import design
-from inercal.turntable.regression import fit
-from inercal.turntable.settings import Design
-from inercal.turntable.task import calibrate, simulate
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.by_angle import channel_model
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.plans import grid, listed
+from inercal.foundation.rigs.tables import turntable
+from inercal.systems.turntable.model import table_model
+from inercal.systems.turntable.positions.planning import design
+from inercal.systems.turntable.regression import fit
+from inercal.systems.turntable.settings import Design
+from inercal.systems.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
 

@@ -8,24 +8,24 @@ from scipy import stats
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from inercal.errors import RecordError, StudyError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import Site
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.rigs.chain import Scope
-from inercal.rigs.distribution import normal, uniform
-from inercal.rigs.outputs import rate_reference
-from inercal.rigs.plans import named
-from inercal.rigs.tables import turntable
-from inercal.turntable.figures import pictures
-from inercal.turntable.rate.fit import approaches, levels
-from inercal.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
-from inercal.turntable.settings import Design, Instrument, RateTest, TurntableSettings
-from inercal.turntable.task import calibrate, simulate
-from inercal.units import parse_unit
+from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.outputs import rate_reference
+from inercal.foundation.rigs.plans import named
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.figures import pictures
+from inercal.systems.turntable.rate.fit import approaches, levels
+from inercal.systems.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
+from inercal.systems.turntable.settings import Design, Instrument, RateTest, TurntableSettings
+from inercal.systems.turntable.task import calibrate, simulate
 
 DEG = np.pi / 180.0
 DEG_H = DEG / 3600.0

@@ -7,13 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 from turntable_studies import DEG_H, TUMBLE, WHEEL_X, study, table
 
-from inercal.errors import RecordError
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.turntable.positions.simulate import simulate
-from inercal.turntable.readings import readings
-from inercal.units import parse_unit
+from inercal.foundation.errors import RecordError
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.readings import readings
 
 JOINTS = ("phi1", "phi2")
 SOURCE = Source("test.csv", "")

@@ -19,14 +19,14 @@ from turntable_studies import (
     wheel_output,
 )
 
-from inercal.geometry.site import Site
-from inercal.instruments.by_angle import CHANNELS
-from inercal.rigs.chain import Scope
-from inercal.rigs.distribution import uniform
-from inercal.rigs.plans import grid, listed, named
-from inercal.turntable.model import table_model
-from inercal.turntable.regression import fit, identify_channels
-from inercal.turntable.weights import weights
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.instruments.by_angle import CHANNELS
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.plans import grid, listed, named
+from inercal.systems.turntable.model import table_model
+from inercal.systems.turntable.regression import fit, identify_channels
+from inercal.systems.turntable.weights import weights
 
 K_X = ("k_x", "k_y", "k_z")
 K_ALL = (*K_X, "kY_x", "kY_y", "kY_z")

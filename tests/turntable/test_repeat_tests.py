@@ -8,14 +8,14 @@ from scipy import stats
 from turntable_studies import ARCMIN, DEG_H, LATITUDE, TUMBLE, WHEEL_X, references, study, wheel_output
 
 from inercal.cli import run
-from inercal.estimate.repeat import combine_runs
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.record import Record
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.turntable.positions.calibration import calibrate_positions
-from inercal.units import parse_unit
+from inercal.foundation.estimate.repeat import combine_runs
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.record import Record
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.positions.calibration import calibrate_positions
 
 NOISE, TURN_ON = 0.01 * DEG_H, 0.2 * DEG_H
 REDRAWN, CONSTANT = ("dphi_y1", "dalpha_x2"), ("deps_y", "dtheta_z")

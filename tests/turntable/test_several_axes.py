@@ -11,18 +11,18 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 from turntable_studies import LATITUDE, codes_of, study
 
-from inercal.convert.models import model_of, worth_knowing
-from inercal.convert.rate_test import RateGyros
-from inercal.errors import RecordError
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.records.record import record_of
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.turntable.figures import page
-from inercal.turntable.settings import Leg, RateTest
-from inercal.turntable.task import calibrate, simulate
-from inercal.units import parse_unit
+from inercal.faces.convert.models import model_of, worth_knowing
+from inercal.faces.convert.rate_test import RateGyros
+from inercal.foundation.errors import RecordError
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.figures import page
+from inercal.systems.turntable.settings import Leg, RateTest
+from inercal.systems.turntable.task import calibrate, simulate
 
 DEG, ARCSEC = np.pi / 180.0, np.pi / 648000.0
 RATES = np.array([-50.0, -20.0, -5.0, 5.0, 20.0, 50.0]) * DEG

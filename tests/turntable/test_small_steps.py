@@ -7,19 +7,19 @@ import pytest
 from scipy import stats
 from turntable_studies import codes_of, study
 
-from inercal.convert.models import model_of
-from inercal.errors import InputError, StudyError
-from inercal.findings import Status
-from inercal.records.record import record_of
-from inercal.rigs.chain import Scope
-from inercal.rigs.distribution import normal
-from inercal.rigs.tables import turntable
-from inercal.turntable.figures import page, pictures
-from inercal.turntable.settings import Disturbances, RateTest, StepTest
-from inercal.turntable.steps.response import respond, senses
-from inercal.turntable.steps.simulate import sequence
-from inercal.turntable.task import calibrate, simulate
-from inercal.units import parse_unit
+from inercal.faces.convert.models import model_of
+from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.findings import Status
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.figures import page, pictures
+from inercal.systems.turntable.settings import Disturbances, RateTest, StepTest
+from inercal.systems.turntable.steps.response import respond, senses
+from inercal.systems.turntable.steps.simulate import sequence
+from inercal.systems.turntable.task import calibrate, simulate
 
 UG, ARCSEC, G = 9.80665e-6, np.radians(1.0 / 3600.0), 9.8
 K0, K1 = 3e-3, 0.1  # output at no input, and per m/s^2

@@ -7,12 +7,12 @@ import pytest
 from new_studies import load_turntable_study
 from turntable_studies import DEG_H, LATITUDE, WHEEL, references, study, wheel_output
 
-from inercal.errors import StudyError
-from inercal.geometry.earth import EARTH_RATE
-from inercal.rigs.plans import grid
-from inercal.turntable.positions.simulate import simulate
-from inercal.turntable.settings import Disturbances, RateTest
-from inercal.turntable.task import simulate as simulate_test
+from inercal.foundation.errors import StudyError
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.rigs.plans import grid
+from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.settings import Disturbances, RateTest
+from inercal.systems.turntable.task import simulate as simulate_test
 
 PLAN = grid((6, 6))
 

@@ -14,19 +14,19 @@ from independent import table_errors
 from numpy.testing import assert_allclose
 from turntable_studies import ARCMIN, DEG_H, TUMBLE, WHEEL, study, table
 
-from inercal.rigs.chain import Chain, Error, Joint, Scope
-from inercal.rigs.distribution import normal
-from inercal.rigs.patterns import Harmonic, Known, Tabulated
-from inercal.rigs.plans import listed
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.model import table_model
-from inercal.turntable.positions.simulate import simulate, truth
-from inercal.turntable.positions.tolerance import shifts
-from inercal.turntable.rate.simulate import simulate_rate_test
-from inercal.turntable.regression import fit
-from inercal.turntable.second_order import second_order
-from inercal.turntable.sensitivity.analysis import analyse
-from inercal.turntable.task import calibrate
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import Harmonic, Known, Tabulated
+from inercal.foundation.rigs.plans import listed
+from inercal.systems.turntable.model import table_model
+from inercal.systems.turntable.positions.simulate import simulate, truth
+from inercal.systems.turntable.positions.tolerance import shifts
+from inercal.systems.turntable.rate.simulate import simulate_rate_test
+from inercal.systems.turntable.regression import fit
+from inercal.systems.turntable.second_order import second_order
+from inercal.systems.turntable.sensitivity.analysis import analyse
+from inercal.systems.turntable.task import calibrate
 
 RUNS = 8
 

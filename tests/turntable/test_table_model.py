@@ -19,11 +19,11 @@ from turntable_studies import (
     wheel_output,
 )
 
-from inercal.errors import StudyError
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import Site
-from inercal.instruments.by_angle import CHANNELS
-from inercal.turntable.model import channels_of, table_model
+from inercal.foundation.errors import StudyError
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.instruments.by_angle import CHANNELS
+from inercal.systems.turntable.model import channels_of, table_model
 
 KINDS = tuple(CHANNELS)
 

@@ -18,8 +18,8 @@ from turntable_studies import (
     wheel_output,
 )
 
-from inercal.rigs.chain import Scope
-from inercal.turntable.positions.simulate import simulate, truth
+from inercal.foundation.rigs.chain import Scope
+from inercal.systems.turntable.positions.simulate import simulate, truth
 
 
 def column(record, name):

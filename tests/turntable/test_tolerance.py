@@ -17,21 +17,21 @@ from turntable_studies import (
     u_without_doubts,
 )
 
-from inercal.geometry.site import GravityInput, Site
-from inercal.rigs.chain import Scope
-from inercal.rigs.distribution import normal
-from inercal.rigs.plans import grid
-from inercal.turntable.model import table_model
-from inercal.turntable.positions.simulate import simulate
-from inercal.turntable.positions.tolerance import (
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.plans import grid
+from inercal.systems.turntable.model import table_model
+from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.positions.tolerance import (
     alternatives,
     coefficient_shares,
     drift_shares,
     shifts,
     sphere_moments,
 )
-from inercal.turntable.regression import fit
-from inercal.turntable.task import calibrate
+from inercal.systems.turntable.regression import fit
+from inercal.systems.turntable.task import calibrate
 
 NOISE = 0.01 * DEG_H
 

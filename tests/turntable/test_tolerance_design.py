@@ -10,15 +10,15 @@ from turntable_studies import ARCMIN, DEG_H, TUMBLE, WHEEL_X, references, study,
 
 import inercal as ic
 from inercal.cli import run
-from inercal.designs.tolerances import LOOSEST, Price
-from inercal.errors import StudyError
-from inercal.rigs.distribution import uniform
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.turntable.figures.tolerances import page
-from inercal.turntable.positions.tolerance_design import design_tolerances
-from inercal.turntable.positions.tolerance_result import result
-from inercal.turntable.settings import Tolerances
+from inercal.foundation.designs.tolerances import LOOSEST, Price
+from inercal.foundation.errors import StudyError
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.systems.turntable.figures.tolerances import page
+from inercal.systems.turntable.positions.tolerance_design import design_tolerances
+from inercal.systems.turntable.positions.tolerance_result import result
+from inercal.systems.turntable.settings import Tolerances
 
 NOISE = 0.01 * DEG_H
 TERMS = ("DX_F", "DX_X", "DX_Y", "DX_Z", "DX_XX", "DX_YY", "DX_XY", "DX_XZ", "DX_YZ")

@@ -5,7 +5,7 @@ import pytest
 
 import inercal as ic
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.turntable.verbs import simulate
+from inercal.systems.turntable.verbs import simulate
 
 EXAMPLE = EXAMPLES["tumble"]
 LAST = {"position": 1.0, "phi1": 0.1, "phi2": 0.1, "acc_x": 1e-6, "acc_y": 1e-6, "acc_z": 1e-6}

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from turntable_studies import usual_terms
 
-from inercal.estimate.coverage import coverage, nees
-from inercal.estimate.runs import run
-from inercal.validate.gyrowheel import (
+from inercal.faces.validate.gyrowheel import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
+from inercal.foundation.estimate.coverage import coverage, nees
+from inercal.foundation.estimate.runs import run
 
 SEED = 20261121
 RUNS = 250

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inercal.estimate.budget import BudgetItem
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
-from inercal.instruments.by_angle import CHANNELS, channel_model
-from inercal.studies.turntable import turntable_study
-from inercal.turntable.display import displayed, tolerances
-from inercal.turntable.positions.outcome import unit_of_term
-from inercal.units import parse_unit
+from inercal.faces.studies.turntable import turntable_study
+from inercal.foundation.estimate.budget import BudgetItem
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.display import displayed, tolerances
+from inercal.systems.turntable.positions.outcome import unit_of_term
 
 
 def estimate(names, output, values):

@@ -6,26 +6,26 @@ import re
 import numpy as np
 import pytest
 
-from inercal.estimate.basis import Basis
-from inercal.estimate.result import Estimate
-from inercal.estimate.rounding import rounded
-from inercal.findings import Status
-from inercal.geometry.site import Site
-from inercal.instruments.terms import shown_unit
-from inercal.report.html import render
-from inercal.report.marks import Dots
-from inercal.report.sphere import hemispheres
-from inercal.rigs.distribution import uniform
-from inercal.rigs.plans import grid, named
-from inercal.rigs.tables import turntable
-from inercal.turntable.display import displayed
-from inercal.turntable.figures import pictures
-from inercal.turntable.figures.design import page as design_page
-from inercal.turntable.positions.planning import design
-from inercal.turntable.positions.simulate import simulate
-from inercal.turntable.settings import Design, Instrument, TurntableSettings
-from inercal.turntable.task import calibrate
-from inercal.units import parse_unit
+from inercal.faces.report.html import render
+from inercal.faces.report.marks import Dots
+from inercal.faces.report.sphere import hemispheres
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.estimate.rounding import rounded
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.plans import grid, named
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.display import displayed
+from inercal.systems.turntable.figures import pictures
+from inercal.systems.turntable.figures.design import page as design_page
+from inercal.systems.turntable.positions.planning import design
+from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.settings import Design, Instrument, TurntableSettings
+from inercal.systems.turntable.task import calibrate
 
 DEG_H = parse_unit("deg/h")
 ARCMIN = np.radians(1.0 / 60.0)

@@ -17,17 +17,17 @@ from turntable_studies import (
     wheel_output,
 )
 
-from inercal.findings import Status
-from inercal.geometry.earth import EARTH_RATE
-from inercal.geometry.site import GravityInput, Site
-from inercal.records.record import record_of
-from inercal.rigs.distribution import normal
-from inercal.rigs.plans import grid
-from inercal.rigs.tables import turntable
-from inercal.turntable.positions.planning import design
-from inercal.turntable.settings import Design, RateTest
-from inercal.turntable.task import calibrate, simulate
-from inercal.units import parse_unit
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.records.record import record_of
+from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.tables import turntable
+from inercal.foundation.units import parse_unit
+from inercal.systems.turntable.positions.planning import design
+from inercal.systems.turntable.settings import Design, RateTest
+from inercal.systems.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
 

@@ -7,12 +7,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from inercal._jit import source_hash
 from inercal.cli import run as inercal
-from inercal.estimate.executors import Serial
-from inercal.geometry import earth
-from inercal.validate import run
-from inercal.validate.foundation import CASES
+from inercal.faces.validate import run
+from inercal.faces.validate.foundation import CASES
+from inercal.foundation._jit import source_hash
+from inercal.foundation.estimate.executors import Serial
+from inercal.foundation.geometry import earth
 
 
 @pytest.fixture(autouse=True)

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inercal.aoa.paper import lever
-from inercal.convert import other_tools
-from inercal.estimate.executors import Serial
-from inercal.findings import Status
-from inercal.geometry import earth, rotations
-from inercal.noise import deviation
-from inercal.selfcal.platform import rig
-from inercal.validate import aoa, foundation, imu, noise, selfcal, strapdown, turntable
-from inercal.validate.case import SOURCES, Case, Numbers, find, judge
-from inercal.validate.run import SYSTEMS, cases_of, validate
+from inercal.faces.convert import other_tools
+from inercal.faces.validate import aoa, foundation, imu, noise, selfcal, strapdown, turntable
+from inercal.faces.validate.case import SOURCES, Case, Numbers, find, judge
+from inercal.faces.validate.run import SYSTEMS, cases_of, validate
+from inercal.foundation.estimate.executors import Serial
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry import earth, rotations
+from inercal.foundation.noise import deviation
+from inercal.systems.aoa.paper import lever
+from inercal.systems.selfcal.platform import rig
 from rows import for_each
 
 CASES = [case for system in SYSTEMS for case in cases_of(system)]
@@ -198,7 +198,7 @@ def test_an_earth_that_turns_backward(monkeypatch, fresh):
 
 @pytest.mark.slow
 def test_an_earth_that_turns_backward_under_a_strapdown_unit(monkeypatch, fresh):
-    monkeypatch.setattr("inercal.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
+    monkeypatch.setattr("inercal.systems.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
     assert "rests-psins-truth" in red(strapdown.CASES, "rests-psins-truth")
 
 

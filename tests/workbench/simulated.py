@@ -8,7 +8,7 @@ from functools import wraps
 from nicegui import Client
 from nicegui.testing.user_simulation import user_simulation
 
-from inercal.workbench.bench import open_bench
+from inercal.bench.workbench.bench import open_bench
 
 
 def of_user(test):
@@ -20,7 +20,7 @@ def of_user(test):
             bench = open_bench(tmp_path / "work", str(tmp_path / "store"))
             try:
                 async with user_simulation() as user:
-                    from inercal.workbench.pages import add_pages
+                    from inercal.bench.workbench.pages import add_pages
 
                     add_pages(bench)
                     try:

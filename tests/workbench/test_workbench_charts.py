@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import inercal as ic
-from inercal.workbench.charts import BLOCK, PIECES, courses, figure, line
+from inercal.bench.workbench.charts import BLOCK, PIECES, courses, figure, line
 
 RNG = np.random.default_rng(5)
 LONG = 2 * PIECES * BLOCK + 100_000

@@ -16,7 +16,7 @@ def doors(monkeypatch):
     """The doors that would have been opened."""
     opened = []
     monkeypatch.setattr(
-        "inercal.workbench.serve.serve", lambda bench, door, told, browser: opened.append(door)
+        "inercal.bench.workbench.serve.serve", lambda bench, door, told, browser: opened.append(door)
     )
     monkeypatch.delenv(GIVEN, raising=False)
     return opened

@@ -4,10 +4,10 @@ import tomllib
 
 import pytest
 
-from inercal.studies.template import template
-from inercal.studies.text import changed
+from inercal.bench.workbench.form import as_toml, problem, tables
+from inercal.faces.studies.template import template
+from inercal.faces.studies.text import changed
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench.form import as_toml, problem, tables
 
 
 def at(data, path):

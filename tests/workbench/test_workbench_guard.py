@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.workbench.guard import LARGEST_BODY, POLICY, Guard, Key
+from inercal.bench.workbench.guard import LARGEST_BODY, POLICY, Guard, Key
 
 HERE, SECRET = "127.0.0.1:8000", "s3cret-of-this-run"
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from inercal.report.marks import Axis, Band, Bars, Dots, Level, Line, Note, Panel, Strips
-from inercal.workbench.interactive import figure
+from inercal.bench.workbench.interactive import figure
+from inercal.faces.report.marks import Axis, Band, Bars, Dots, Level, Line, Note, Panel, Strips
 
 
 def test_every_mark_is_a_trace_or_a_shape():

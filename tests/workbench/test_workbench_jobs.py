@@ -9,10 +9,10 @@ import time
 
 import pytest
 
-from inercal.errors import InputError
+from inercal.bench.workbench import jobs
+from inercal.bench.workbench.jobs import Queue, State
 from inercal.examples import FOLDER
-from inercal.workbench import jobs
-from inercal.workbench.jobs import Queue, State
+from inercal.foundation.errors import InputError
 
 LISTS = ["examples", "--json", "--quiet"]
 """A command that takes a moment."""
@@ -79,7 +79,7 @@ def test_the_same_command_again_writes_to_its_own_folder(queue, tmp_path):
 _BEGINS = """
 import sys, time
 from pathlib import Path
-from inercal.workbench.jobs import Queue
+from inercal.bench.workbench.jobs import Queue
 queue = Queue(Path(sys.argv[1]))
 done = queue.add("0001", Path(sys.argv[1]), ["examples", "--quiet"])
 queue.wait(done.id, 60.0)
@@ -190,9 +190,9 @@ SOUND = {
     ],
 )  # fmt: skip
 def test_a_job_that_an_earlier_workbench_left_spoiled_is_told_or_left_out(spoiled, tmp_path):
-    from inercal.workbench.bench import Bench
-    from inercal.workbench.rest import _of_job
-    from inercal.workbench.sessions import Sessions
+    from inercal.bench.workbench.bench import Bench
+    from inercal.bench.workbench.rest import _of_job
+    from inercal.bench.workbench.sessions import Sessions
 
     for folder, about in (("00001", {**SOUND, **spoiled}), ("00002", SOUND), ("other", SOUND)):
         (tmp_path / "jobs" / folder).mkdir(parents=True)

@@ -14,19 +14,19 @@ import pytest
 from browsing import browser, needs_browser, opened, serious
 from serving import served
 
-from inercal.errors import InputError
+from inercal.bench.workbench.bench import open_bench
+from inercal.bench.workbench.live_pictures import POINTS, drawable, figure, words_of
+from inercal.bench.workbench.live_status import status
+from inercal.bench.workbench.measurements import MOST, Wish, interval_of, next_name
+from inercal.bench.workbench.sessions import put
 from inercal.examples import FOLDER
-from inercal.workbench.bench import open_bench
-from inercal.workbench.live_pictures import POINTS, drawable, figure, words_of
-from inercal.workbench.live_status import status
-from inercal.workbench.measurements import MOST, Wish, interval_of, next_name
-from inercal.workbench.sessions import put
+from inercal.foundation.errors import InputError
 
 pytest.importorskip("nicegui")
 
 import httpx
 
-from inercal.workbench.rest import rest_of
+from inercal.bench.workbench.rest import rest_of
 
 
 @contextmanager
@@ -169,7 +169,7 @@ def test_no_wish_leads_out_of_the_session(bench, wish, words):
 
 
 def test_a_session_is_measured_once_and_so_many_at_a_time(bench, monkeypatch):
-    monkeypatch.setattr("inercal.live.measurement.Measurement.start", lambda self: None)
+    monkeypatch.setattr("inercal.bench.live.measurement.Measurement.start", lambda self: None)
     sessions = [bench.sessions.begin_with("sting") for _ in range(MOST + 1)]
     for session in sessions[:MOST]:
         bench.measurements.begin(session, Wish("udp://127.0.0.1:5005"))

@@ -6,9 +6,9 @@ import tomllib
 
 import pytest
 
+from inercal.bench.workbench.jobs import State
 from inercal.examples import EXAMPLES
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench.jobs import State
 from rows import for_each
 
 pytest.importorskip("nicegui")
@@ -16,7 +16,7 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from simulated import of_user
 
-from inercal.workbench.pages.run import part_of
+from inercal.bench.workbench.pages.run import part_of
 
 
 async def run(bench, session):

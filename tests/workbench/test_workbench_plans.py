@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from inercal.errors import InputError
+from inercal.bench.workbench.plans import lines_of, named, with_found, with_lines
 from inercal.examples import FOLDER
-from inercal.face.foresight import verticals
-from inercal.face.study import read_study
-from inercal.studies.text import with_keys
+from inercal.faces.python.foresight import verticals
+from inercal.faces.python.study import read_study
+from inercal.faces.studies.text import with_keys
+from inercal.foundation.errors import InputError
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench.plans import lines_of, named, with_found, with_lines
 
 FILES = {
     "turntable": "gyro.toml",

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
+from inercal.bench.workbench.advice import advice_of
+from inercal.bench.workbench.charts import Notes, courses, figure, marks_of
+from inercal.bench.workbench.residuals import figure as of_residuals
+from inercal.bench.workbench.residuals import parts_of, spans_of
 from inercal.examples import FOLDER
-from inercal.findings import Finding
-from inercal.inputs import Source
-from inercal.records.column import Column
-from inercal.records.quiet import quiet
-from inercal.records.record import Record
-from inercal.units import parse_unit
-from inercal.workbench.advice import advice_of
-from inercal.workbench.charts import Notes, courses, figure, marks_of
-from inercal.workbench.residuals import figure as of_residuals
-from inercal.workbench.residuals import parts_of, spans_of
+from inercal.foundation.findings import Finding
+from inercal.foundation.inputs import Source
+from inercal.foundation.records.column import Column
+from inercal.foundation.records.quiet import quiet
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import parse_unit
 
 RESULTS = {
     "poses": (

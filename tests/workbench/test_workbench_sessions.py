@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.errors import InputError
+from inercal.bench.workbench import sessions as module
+from inercal.bench.workbench.bench import open_bench
+from inercal.bench.workbench.sessions import MAP, STUDY, Sessions, receive, safe_name
 from inercal.examples import EXAMPLES
+from inercal.foundation.errors import InputError
 from inercal.systems.listed import SYSTEMS
-from inercal.workbench import sessions as module
-from inercal.workbench.bench import open_bench
-from inercal.workbench.sessions import MAP, STUDY, Sessions, receive, safe_name
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import warnings
 from types import FrameType
 
 from inercal import __version__
-from inercal.addresses import shown_address, without_secrets
-from inercal.errors import InercalError
+from inercal.foundation.addresses import shown_address, without_secrets
+from inercal.foundation.errors import InercalError
 
 # The matrices here are small: threads of the linear algebra library cost more than they bring.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.aoa.estimators import Centrifugal, States, Static, Tangential
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
+from inercal.systems.aoa.estimators import Centrifugal, States, Static, Tangential
 
 if TYPE_CHECKING:
-    from inercal.aoa.settings import AoaSettings
     from inercal.cli.streaming import Estimators
-    from inercal.records.record import Record
-    from inercal.stream.lines import Lines
-    from inercal.stream.run import Recursive
+    from inercal.faces.stream.lines import Lines
+    from inercal.faces.stream.run import Recursive
+    from inercal.foundation.records.record import Record
+    from inercal.systems.aoa.settings import AoaSettings
 
 
 @Parameter(name="*")
@@ -141,10 +141,10 @@ def aoa(
         return 1 if failure else 0
     paths = recorded("aoa", files, streaming, every)
 
-    from inercal._jit import compiling
-    from inercal.aoa import verbs as system
-    from inercal.face.study import one_run, read_study
-    from inercal.records.write import SUFFIXES
+    from inercal.faces.python.study import one_run, read_study
+    from inercal.foundation._jit import compiling
+    from inercal.foundation.records.write import SUFFIXES
+    from inercal.systems.aoa import verbs as system
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study = read_study("aoa", study, keys)
@@ -172,12 +172,12 @@ def _runs(
     output: ResultOutput,
 ) -> int:
     """Measure the runs of a table."""
-    from inercal._jit import compiling
-    from inercal.aoa import verbs as system
-    from inercal.face.study import read_study
-    from inercal.records.maps import read_map
-    from inercal.records.read import read
-    from inercal.records.write import SUFFIXES
+    from inercal.faces.python.study import read_study
+    from inercal.foundation._jit import compiling
+    from inercal.foundation.records.maps import read_map
+    from inercal.foundation.records.read import read
+    from inercal.foundation.records.write import SUFFIXES
+    from inercal.systems.aoa import verbs as system
 
     for option, given in (("FILES", bool(files)), ("--stream", stream)):
         if given:
@@ -209,7 +209,7 @@ def _live(
     output: ResultOutput,
 ) -> Estimators:
     """Prepare a measurement row by row; ``made`` receives it."""
-    from inercal.live.estimators import aoa as prepared
+    from inercal.bench.live.estimators import aoa as prepared
 
     make = prepared(settings, interval, output.say, output.say_finding)
 

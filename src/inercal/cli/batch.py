@@ -22,7 +22,7 @@ from inercal.cli.options import (
     reading,
 )
 from inercal.cli.outcome import emit
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 
 @Parameter(name="*")
@@ -49,8 +49,8 @@ def batch(
     output: FolderOutput = FolderOutput(),
 ) -> int:
     """Calibrate every unit of a fleet."""
-    from inercal.fleet.batch import batch as of_fleet
-    from inercal.fleet.batch import written
+    from inercal.laboratory.fleet.batch import batch as of_fleet
+    from inercal.laboratory.fleet.batch import written
     from inercal.laboratory.store import open_store
 
     if output.out is None:

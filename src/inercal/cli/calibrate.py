@@ -21,12 +21,12 @@ from inercal.cli.options import (
 )
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import StreamOptions, recorded, stream_study
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
-    from inercal.imu.temperature.model import TemperatureModel
-    from inercal.strapdown.settings import StrapdownSettings
+    from inercal.systems.imu.temperature.model import TemperatureModel
+    from inercal.systems.strapdown.settings import StrapdownSettings
 
 
 def calibrate_imu(
@@ -84,7 +84,7 @@ def calibrate_strapdown(
 
 def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) -> Estimators:
     """Prepare a calibration rest by rest."""
-    from inercal.live.estimators import strapdown as prepared
+    from inercal.bench.live.estimators import strapdown as prepared
 
     return prepared(settings, output.say, output.say_finding)
 
@@ -113,7 +113,7 @@ def _calibrated(
     output: ResultOutput,
 ) -> int:
     """Read study and records, calibrate, and hand over."""
-    from inercal.face.study import read_study
+    from inercal.faces.python.study import read_study
 
     output.check(WHOLE, (*files, map_file, study))
     the_study = read_study(kind, study, overrides or ())
@@ -123,7 +123,7 @@ def _calibrated(
     read_s = time.perf_counter() - clock
     system = the_study.system
     if system.prepare:
-        from inercal._jit import compiling
+        from inercal.foundation._jit import compiling
 
         with compiling(kind, output.say):
             system.prepare(the_study, False)
@@ -148,8 +148,8 @@ def temperature(
     """Fit what a sensor's output or its calibration does with temperature."""
     from dataclasses import replace
 
-    from inercal.imu.verbs import of_temperature
-    from inercal.units import parse_quantity
+    from inercal.foundation.units import parse_quantity
+    from inercal.systems.imu.verbs import of_temperature
 
     reference = parse_quantity(at, "temperature", "--at").value
     output.check(WHOLE, (*files, map_file))
@@ -160,7 +160,7 @@ def temperature(
         span.refuse("calibrations")
         model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
     else:
-        from inercal.imu.temperature.sweep import fit_recording
+        from inercal.systems.imu.temperature.sweep import fit_recording
 
         record = read_record(files, map_file, output, span)
         read_s = time.perf_counter() - clock
@@ -172,8 +172,8 @@ def temperature(
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
     """The model of saved calibrations, in the order given."""
-    from inercal.estimate.files import load
-    from inercal.imu.temperature.calibrations import fit_calibrations
-    from inercal.records.read import source_of
+    from inercal.foundation.estimate.files import load
+    from inercal.foundation.records.read import source_of
+    from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
     return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)

@@ -10,11 +10,11 @@ from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, StoreOption
 from inercal.cli.outcome import emit
-from inercal.errors import InputError
-from inercal.estimate.table import aligned
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.table import aligned
 
 if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
+    from inercal.foundation.estimate.result import Estimate
     from inercal.laboratory.certificate.reading import Certificate
     from inercal.laboratory.store import Store
 
@@ -87,15 +87,15 @@ def _write(
     from contextlib import AbstractContextManager, nullcontext
     from datetime import UTC, datetime
 
-    from inercal._files import read_bytes, write_bytes, write_text
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation._files import read_bytes, write_bytes, write_text
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.places import counted
+    from inercal.foundation.records.read import source_of
     from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import certificate_of
     from inercal.laboratory.certificate.written import certificate as written
     from inercal.laboratory.issue import issuing
-    from inercal.records.places import counted
-    from inercal.records.read import source_of
 
     stated = read_lab(lab)
     opened = _store(store)
@@ -152,7 +152,7 @@ def _store(given: str | None) -> Store | None:
 
 def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
     """A result of a file or of the store, and its report."""
-    from inercal.estimate.files import load
+    from inercal.foundation.estimate.files import load
 
     if Path(given).is_file() or store is None:
         return load(given), report
@@ -183,11 +183,11 @@ def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) ->
 
 def _read(path: Path, html: Path | None, output: FileOutput) -> None:
     """Print what a certificate states, and write it as a page where that is asked for."""
-    from inercal._files import write_text
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.read import source_of
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import read_certificate
-    from inercal.records.read import source_of
 
     found = read_certificate(path)
     if html is not None:

@@ -22,8 +22,8 @@ from inercal.cli.options import (
 from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
-    from inercal.selfcal.platform.plan import Plan
-    from inercal.turntable.settings import TurntableSettings
+    from inercal.systems.selfcal.platform.plan import Plan
+    from inercal.systems.turntable.settings import TurntableSettings
 
 
 def design_positions(
@@ -36,8 +36,8 @@ def design_positions(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the positions of a turntable that calibrate best."""
-    from inercal._files import write_text
-    from inercal.turntable import verbs as system
+    from inercal.foundation._files import write_text
+    from inercal.systems.turntable import verbs as system
 
     output.check((*WHOLE, ".csv"), (study,))
     place = place_of(workers, cluster)
@@ -59,9 +59,9 @@ def design_tolerances(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
-    from inercal._files import write_text
-    from inercal.turntable import verbs as system
-    from inercal.turntable.positions.tolerance_result import study_tables
+    from inercal.foundation._files import write_text
+    from inercal.systems.turntable import verbs as system
+    from inercal.systems.turntable.positions.tolerance_result import study_tables
 
     output.check((".json", ".toml"), (study,))
     the_study, read_s = study_in("turntable", study, overrides, output)
@@ -84,9 +84,9 @@ def design_selfcal(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Find the path on which a platform calibrates itself best."""
-    from inercal._files import write_text
-    from inercal._jit import compiling
-    from inercal.selfcal import verbs as system
+    from inercal.foundation._files import write_text
+    from inercal.foundation._jit import compiling
+    from inercal.systems.selfcal import verbs as system
 
     output.check((".json", ".toml"), (study,))
     place = place_of(workers, cluster)
@@ -110,10 +110,10 @@ def design_strapdown(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say what the turns of a strapdown unit tell, and find better ones."""
-    from inercal._files import write_text
-    from inercal._jit import compiling
-    from inercal.strapdown import verbs as system
-    from inercal.strapdown.design import study_table
+    from inercal.foundation._files import write_text
+    from inercal.foundation._jit import compiling
+    from inercal.systems.strapdown import verbs as system
+    from inercal.systems.strapdown.design import study_table
 
     output.check((".json", ".toml"), (study,))
     the_study, read_s = study_in("strapdown", study, overrides, output)
@@ -136,8 +136,8 @@ def design_aoa(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say what the sensors of a model can tell of its angle, and other layouts beside."""
-    from inercal._jit import compiling
-    from inercal.aoa import verbs as system
+    from inercal.foundation._jit import compiling
+    from inercal.systems.aoa import verbs as system
 
     output.check(WHOLE, (study,))
     the_study, read_s = study_in("aoa", study, overrides, output)
@@ -157,7 +157,7 @@ def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings
 
 def _plan(plan: Plan, message: str) -> str:
     """A plan as the table of a study."""
-    from inercal.selfcal.before.path_design import stated_moves
+    from inercal.systems.selfcal.before.path_design import stated_moves
 
     moves = (f"    {json.dumps(move)},\n" for move in stated_moves(plan.moves))
     start = [f"{math.degrees(angle):.10g} deg" for angle in plan.start]
@@ -177,7 +177,7 @@ def sensitivity(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Say which error of a turntable matters."""
-    from inercal.turntable import verbs as system
+    from inercal.systems.turntable import verbs as system
 
     output.check((*WHOLE, ".nc", ".npz"), (study,))
     place = place_of(workers, cluster)
@@ -189,7 +189,7 @@ def sensitivity(
         output.say(analysed.note)
 
     def maps(path: Path) -> None:
-        from inercal.turntable.sensitivity.maps import write_maps
+        from inercal.systems.turntable.sensitivity.maps import write_maps
 
         write_maps(analysed, path)
 

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from inercal.cli.options import ReportOutput, StoreOption
 from inercal.cli.outcome import WHOLE, hand_over
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 
 def history(
@@ -36,9 +36,9 @@ def history(
     """Follow the coefficients of an instrument from calibration to calibration."""
     from datetime import date
 
-    from inercal._files import write_text
-    from inercal.face.laboratory import history as history_of
-    from inercal.face.laboratory import specification_in
+    from inercal.faces.python.laboratory import history as history_of
+    from inercal.faces.python.laboratory import specification_in
+    from inercal.foundation._files import write_text
     from inercal.laboratory.history_page import rows_csv
 
     try:

@@ -11,8 +11,8 @@ from cyclopts import Parameter
 from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit, say_findings
-from inercal.errors import InercalError, InputError
-from inercal.estimate.table import aligned
+from inercal.foundation.errors import InercalError, InputError
+from inercal.foundation.estimate.table import aligned
 
 if TYPE_CHECKING:
     import subprocess
@@ -32,14 +32,14 @@ def keep(
     report: Annotated[Path | None, Parameter(help="Its report, kept beside it.")] = None,
 ) -> None:
     """Keep a result that was made elsewhere."""
-    from inercal._files import read_bytes
-    from inercal.estimate.files import load
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation._files import read_bytes
+    from inercal.foundation.estimate.files import load
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.read import source_of
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.keep import item_of, saved_in
     from inercal.laboratory.keep import keep as kept
     from inercal.laboratory.store import open_store
-    from inercal.records.read import source_of
 
     opened = open_store(store)
     estimate = load(result)
@@ -59,10 +59,10 @@ def keep(
 
 def instruments(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
     """List the instruments of a store."""
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.places import counted
     from inercal.laboratory.catalog import instruments as listed
     from inercal.laboratory.store import open_store
-    from inercal.records.places import counted
 
     opened = open_store(store)
     rows = listed(opened)
@@ -84,12 +84,12 @@ def results(
     """List the results of a store."""
     from datetime import date
 
-    from inercal.estimate.result import without_coefficients
-    from inercal.findings import Status
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.findings import Status
+    from inercal.foundation.records.places import counted
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import results as listed
     from inercal.laboratory.store import open_store
-    from inercal.records.places import counted
 
     if status is not None and status not in [each.value for each in Status]:
         raise InputError("--status", f"found {status!r}, expected {', '.join(each.value for each in Status)}")
@@ -122,8 +122,8 @@ def show(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Show a result of a store."""
-    from inercal._files import write_bytes
-    from inercal.estimate.files import save
+    from inercal.foundation._files import write_bytes
+    from inercal.foundation.estimate.files import save
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown
     from inercal.laboratory.store import open_store
@@ -171,7 +171,7 @@ def supersede(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Say that a result takes the place of another."""
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation.estimate.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.store import open_store
     from inercal.laboratory.supersede import supersede as superseded
@@ -195,9 +195,9 @@ def rerun(
     import tempfile
 
     from inercal.cli.stored_line import stored_line
-    from inercal.estimate.files import from_json
-    from inercal.estimate.result import without_coefficients
-    from inercal.estimate.rounding import rounded
+    from inercal.foundation.estimate.files import from_json
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.estimate.rounding import rounded
     from inercal.laboratory.again import beside, laid_out, verdict
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown

@@ -14,12 +14,12 @@ from cyclopts import Parameter
 from inercal.cli import EXIT_INTERRUPTED, abandon_output
 from inercal.cli.options import MapFile, Output, Overrides
 from inercal.cli.streaming import Every, StreamOptions, interval_of
-from inercal.errors import InercalError, InputError
+from inercal.foundation.errors import InercalError, InputError
 
 if TYPE_CHECKING:
-    from inercal.live.address import Sink
-    from inercal.live.estimators import Make, Say, SayFinding
-    from inercal.live.measurement import Measurement
+    from inercal.bench.live.address import Sink
+    from inercal.bench.live.estimators import Make, Say, SayFinding
+    from inercal.bench.live.measurement import Measurement
 
 _EVERY = 30.0
 """Time [s] from one line of counts to the next."""
@@ -58,9 +58,9 @@ def live(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> int:
     """Measure an instrument by wire."""
-    from inercal.live.address import sink_of, source_of
-    from inercal.live.measurement import Measurement, Plan
-    from inercal.stream.run import Saving
+    from inercal.bench.live.address import sink_of, source_of
+    from inercal.bench.live.measurement import Measurement, Plan
+    from inercal.faces.stream.run import Saving
 
     wire = source_of(source)
     sinks = [sink_of(each) for each in to or ("text:-",)]
@@ -70,7 +70,7 @@ def live(
         raise InputError("--after", "found with a live source, expected it with a stream that begins anew")
     record_map = None
     if map_file is not None:
-        from inercal.records.maps import read_map
+        from inercal.foundation.records.maps import read_map
 
         record_map = read_map(map_file)
     saving = None
@@ -91,12 +91,12 @@ def _estimator(
         found = "neither" if study is None else "both"
         raise InputError("--study, --apply", f"found {found}, expected one of them")
     if study is not None:
-        from inercal.face.study import kind_of, read_study
+        from inercal.faces.python.study import kind_of, read_study
 
         of = read_study(kind_of(study), study, keys)
 
         def by_study(say: Say, say_finding: SayFinding) -> Make:
-            from inercal.live.estimators import of_study
+            from inercal.bench.live.estimators import of_study
 
             return of_study(of, interval, say, say_finding)
 
@@ -109,7 +109,7 @@ def _estimator(
     model, findings, _ = usable(calibration)
 
     def correcting(say: Say, say_finding: SayFinding) -> Make:
-        from inercal.stream.apply import Apply
+        from inercal.faces.stream.apply import Apply
 
         for finding in findings:
             say_finding(finding)

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, Overrides
 from inercal.cli.outcome import emit
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 Rate = Annotated[
     str | None,
@@ -84,8 +84,8 @@ def new_lab(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Write what a laboratory states in its certificates, to be filled in."""
-    from inercal._files import write_text
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.result import without_coefficients
     from inercal.laboratory.certificate.lab import lab_template
 
     output.check((".toml",))
@@ -99,12 +99,12 @@ def new_lab(
 
 def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
-    from inercal._files import write_text
-    from inercal.estimate.result import without_coefficients
-    from inercal.face.beginning import begun, mapped
-    from inercal.records.read import source_of
-    from inercal.studies.starting import UNKNOWN
-    from inercal.units import parse_quantity
+    from inercal.faces.python.beginning import begun, mapped
+    from inercal.faces.studies.starting import UNKNOWN
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.read import source_of
+    from inercal.foundation.units import parse_quantity
 
     output.check((".toml",), files)
     if rate is not None:

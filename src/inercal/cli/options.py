@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from inercal.cli import printable, show
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
     from cyclopts import Token
 
-    from inercal.estimate.executors import Executor
-    from inercal.face.study import Study as StudyOfFile
-    from inercal.findings import Finding
-    from inercal.records.record import Record
+    from inercal.faces.python.study import Study as StudyOfFile
+    from inercal.foundation.estimate.executors import Executor
+    from inercal.foundation.findings import Finding
+    from inercal.foundation.records.record import Record
 
 Files = Annotated[
     list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
@@ -196,7 +196,7 @@ class Span:
 
     def check(self) -> None:
         """Refuse a time that is none, before anything is read; raises `InputError`."""
-        from inercal.records.record import seconds
+        from inercal.foundation.records.record import seconds
 
         for option, text in self.given.items():
             seconds(text, option)
@@ -224,7 +224,7 @@ def read_record(
     files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
 ) -> Record:
     """Read recordings, with a progress bar where it takes long, and take the part that is asked for."""
-    from inercal.records.read import read
+    from inercal.foundation.records.read import read
 
     return _read(lambda *given: [read(*given)], files, map_file, output, span)[0]
 
@@ -240,7 +240,7 @@ def read_repeats(
 
     ``counted``: rows need no times, as means of poses.
     """
-    from inercal.records.read import read_runs
+    from inercal.foundation.records.read import read_runs
 
     return _read(partial(read_runs, counted=counted), files, map_file, output, span)
 
@@ -253,7 +253,7 @@ def _read(
     span: Span,
 ) -> list[Record]:
     """Records by one of the readers, and the part of each that is asked for."""
-    from inercal.records.maps import read_map
+    from inercal.foundation.records.maps import read_map
 
     span.check()
     record_map = None if map_file is None else read_map(map_file)
@@ -267,7 +267,7 @@ def study_in(
     kind: str, path: Path, overrides: Iterable[str] | None, output: FileOutput
 ) -> tuple[StudyOfFile, float]:
     """A study, whose files the output is to spare, and the time that reading took [s]."""
-    from inercal.face.study import read_study
+    from inercal.faces.python.study import read_study
 
     clock = time.perf_counter()
     study = read_study(kind, path, overrides or ())
@@ -320,7 +320,7 @@ def count_of(workers: int | None, cluster: str | None) -> int:
 
 def place_of(workers: int | None, cluster: str | None) -> Executor:
     """The place in which starts or positions are computed, by the two options; raises `InputError`."""
-    from inercal.estimate.cluster import place
+    from inercal.foundation.estimate.cluster import place
 
     return place(1 if workers is None and cluster is None else count_of(workers, cluster), cluster)
 

@@ -11,9 +11,9 @@ from inercal.cli import EXIT_BAD_VERDICT, command_line, process_age
 from inercal.cli.options import Output, ReportOutput, ResultOutput
 
 if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
-    from inercal.face.result import Result
-    from inercal.findings import Finding
+    from inercal.faces.python.result import Result
+    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.findings import Finding
 
 WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
@@ -27,7 +27,7 @@ def say_findings(findings: Iterable[Finding], output: Output) -> None:
 
     A single one more is told itself, in the place of the line that would count it.
     """
-    from inercal.findings import most_harmful
+    from inercal.foundation.findings import most_harmful
 
     ordered = most_harmful(findings)
     told = len(ordered) if len(ordered) <= _SHOWN + 1 else _SHOWN
@@ -40,7 +40,7 @@ def say_findings(findings: Iterable[Finding], output: Output) -> None:
 
 def emit(estimate: Estimate, text: str, output: Output) -> None:
     """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
-    from inercal.estimate.files import to_json
+    from inercal.foundation.estimate.files import to_json
 
     output.emit(to_json(timed(estimate)) if output.json else {}, text)
 
@@ -59,9 +59,9 @@ def hand_over(
     People see the ``tables`` that are not empty; ``what`` the file is, in a word. ``write`` writes it where its
     suffix is not one of ``whole``.
     """
-    from inercal._files import write_text
-    from inercal.estimate.files import save
-    from inercal.findings import Status
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.files import save
+    from inercal.foundation.findings import Status
 
     estimate = timed(estimate)
     estimate = replace(estimate, provenance={**estimate.provenance, "arguments": command_line()})

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from inercal.cli import show
 from inercal.cli.options import FileOutput
 from inercal.cli.outcome import emit
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 
 def examples(
@@ -21,9 +21,9 @@ def examples(
     """List the recordings that ship with inercal, or copy one."""
     from pathlib import Path
 
-    from inercal._files import read_bytes, write_bytes
-    from inercal.estimate.result import without_coefficients
     from inercal.examples import EXAMPLES, FOLDER, shipped
+    from inercal.foundation._files import read_bytes, write_bytes
+    from inercal.foundation.estimate.result import without_coefficients
 
     if name is None:
         if output.out is not None:
@@ -55,8 +55,8 @@ def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen
     """Print the JSON Schema of study files."""
     import json
 
-    from inercal._files import write_text
-    from inercal.studies.schema import json_schema
+    from inercal.faces.studies.schema import json_schema
+    from inercal.foundation._files import write_text
 
     output.check((".json",))
     document = json_schema()
@@ -90,8 +90,8 @@ def completion(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Print the script by which a shell completes commands."""
-    from inercal._files import write_text
-    from inercal.estimate.result import without_coefficients
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.result import without_coefficients
 
     output.check(())
     text = script(shell)

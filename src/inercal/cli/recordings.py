@@ -20,22 +20,22 @@ def inspect(
     output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
 ) -> None:
     """Look at a recording before it is used."""
-    from inercal._files import write_text
-    from inercal.estimate.files import save
-    from inercal.estimate.result import without_coefficients
-    from inercal.records.places import counted
-    from inercal.report.inspection import (
+    from inercal.faces.report.inspection import (
         channels_table,
         inspection_pictures,
         norms,
         render_inspection,
         summary,
     )
+    from inercal.foundation._files import write_text
+    from inercal.foundation.estimate.files import save
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.places import counted
 
     output.check(WHOLE, (*files, map_file))
     record = read_record(files, map_file, output, span)
     if {"wc_x", "th_x", "acc_x"} <= record.columns.keys():  # a platform in gimbals
-        from inercal.selfcal.reading import worth_saying
+        from inercal.systems.selfcal.reading import worth_saying
 
         record = replace(record, findings=tuple(worth_saying(record, record.columns.values())))
     words = counted(len(record.findings), "finding") if record.findings else "nothing suspicious"
@@ -63,9 +63,9 @@ def allan(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Tell the noise of an instrument at rest."""
-    from inercal._files import write_text
-    from inercal.face.noise import allan as noise_of
-    from inercal.report.allan import curves_csv
+    from inercal.faces.python.noise import allan as noise_of
+    from inercal.faces.report.allan import curves_csv
+    from inercal.foundation._files import write_text
 
     output.check((*WHOLE, ".csv"), (*files, map_file))
     clock = time.perf_counter()
@@ -91,7 +91,7 @@ def monitor(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Tell rest from motion, live, and measure the noise at rest."""
-    from inercal.live.estimators import monitor as prepared
+    from inercal.bench.live.estimators import monitor as prepared
 
     interval = interval_of(every)
     streaming.check(output, (file, map_file))

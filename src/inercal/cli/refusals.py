@@ -15,8 +15,8 @@ from cyclopts import (
 )
 from cyclopts.exceptions import UnknownCommandError
 
-from inercal.keys import in_place_of
-from inercal.units import shown
+from inercal.foundation.keys import in_place_of
+from inercal.foundation.units import shown
 
 
 def refusal(error: CycloptsError, commands: dict[str, list[str]], usage: str) -> str:

@@ -13,13 +13,13 @@ from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
 from inercal.cli.outcome import WHOLE, emit, give, say_findings
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.convert.correction import Model
-    from inercal.convert.other_tools import Converted
-    from inercal.estimate.result import Estimate
-    from inercal.findings import Finding
+    from inercal.faces.convert.correction import Model
+    from inercal.faces.convert.other_tools import Converted
+    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.findings import Finding
 
 
 def apply(
@@ -49,7 +49,7 @@ def apply(
     """Correct a recording with a calibration."""
     if stream:
         span.refuse("a stream")
-        from inercal.stream.apply import Apply
+        from inercal.faces.stream.apply import Apply
 
         file = streamed(files)
         streaming.check(output, (calibration, file, map_file))
@@ -60,11 +60,11 @@ def apply(
         )
         return
 
-    from inercal.convert.correction import apply_to
-    from inercal.estimate.result import without_coefficients
-    from inercal.face.calibrations import worth_saying
-    from inercal.records.read import source_of
-    from inercal.records.write import SUFFIXES, write_record
+    from inercal.faces.convert.correction import apply_to
+    from inercal.faces.python.calibrations import worth_saying
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.read import source_of
+    from inercal.foundation.records.write import SUFFIXES, write_record
 
     paths = recorded("apply", files, streaming)
     if output.out is None:
@@ -84,8 +84,8 @@ def apply(
 
 def usable(calibration: Path, uncertainty: bool = False) -> tuple[Model, tuple[Finding, ...], Estimate]:
     """The instrument of a calibration that was saved, what to say of that, and the calibration."""
-    from inercal.convert.models import model_of, worth_knowing
-    from inercal.face.calibrations import read_estimate
+    from inercal.faces.convert.models import model_of, worth_knowing
+    from inercal.faces.python.calibrations import read_estimate
 
     estimate = read_estimate(calibration)
     return (
@@ -106,10 +106,10 @@ def compare(
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Compare two calibrations of one instrument."""
-    from inercal.estimate.compare import Saved
-    from inercal.estimate.compare import compare as compared
-    from inercal.face.calibrations import of_comparison, read_estimate
-    from inercal.records.read import source_of
+    from inercal.faces.python.calibrations import of_comparison, read_estimate
+    from inercal.foundation.estimate.compare import Saved
+    from inercal.foundation.estimate.compare import compare as compared
+    from inercal.foundation.records.read import source_of
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
@@ -143,10 +143,10 @@ def convert(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Convert a calibration to or from another tool's."""
-    from inercal.convert.other_tools import CONVENTIONS, from_tool, to_tool
-    from inercal.estimate.files import load
-    from inercal.findings import Status
-    from inercal.records.read import source_of
+    from inercal.faces.convert.other_tools import CONVENTIONS, from_tool, to_tool
+    from inercal.foundation.estimate.files import load
+    from inercal.foundation.findings import Status
+    from inercal.foundation.records.read import source_of
 
     if to is None and source is None:
         raise InputError("--to", "missing, expected --to or --from and one of " + ", ".join(CONVENTIONS))
@@ -174,7 +174,7 @@ def convert(
 
 def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     """The calibration, to its file and as a table."""
-    from inercal.estimate.files import save
+    from inercal.foundation.estimate.files import save
 
     for finding in estimate.findings:  # all: what was not held is among them
         output.say_finding(finding)
@@ -186,7 +186,7 @@ def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
 
 def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: FileOutput) -> None:
     """The files of the tool and the table of their terms; without --out their texts instead."""
-    from inercal._files import write_text
+    from inercal.foundation._files import write_text
 
     estimate = converted.estimate
     for finding in estimate.findings:

@@ -12,12 +12,12 @@ from cyclopts import Parameter
 from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
-from inercal.errors import InputError
-from inercal.selfcal.estimators import FilterKind
+from inercal.foundation.errors import InputError
+from inercal.systems.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
     from inercal.cli.streaming import Estimators
-    from inercal.selfcal.settings import SelfcalSettings
+    from inercal.systems.selfcal.settings import SelfcalSettings
 
 
 def selfcal(
@@ -64,10 +64,10 @@ def selfcal(
         raise InputError("--until-goals", "found without --stream, expected them together")
     paths = recorded("selfcal", files, streaming, every)
 
-    from inercal._jit import compiling
-    from inercal.face.study import read_study
-    from inercal.records.write import SUFFIXES
-    from inercal.selfcal import verbs as system
+    from inercal.faces.python.study import read_study
+    from inercal.foundation._jit import compiling
+    from inercal.foundation.records.write import SUFFIXES
+    from inercal.systems.selfcal import verbs as system
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     of = read_study("selfcal", study, keys)
@@ -89,6 +89,6 @@ def selfcal(
 
 def _live(settings: SelfcalSettings, interval: float, output: ResultOutput, until_goals: bool) -> Estimators:
     """Prepare a calibration row by row."""
-    from inercal.live.estimators import selfcal as prepared
+    from inercal.bench.live.estimators import selfcal as prepared
 
     return prepared(settings, interval, output.say, output.say_finding, until_goals)

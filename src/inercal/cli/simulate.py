@@ -23,7 +23,7 @@ from inercal.cli.options import (
     whole_number,
 )
 from inercal.cli.outcome import WHOLE, emit, hand_over
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 Seed = Annotated[
     int, Parameter(converter=whole_number, help="Seed of the random numbers, 0 or more; 1 if absent.")
@@ -125,16 +125,16 @@ def _campaign(
     output: ReportOutput,
 ) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
-    from inercal._jit import compiling
-    from inercal.estimate.cluster import Cluster
-    from inercal.estimate.executors import Threads
-    from inercal.estimate.result import without_coefficients
-    from inercal.face.study import read_study
-    from inercal.findings import Status
-    from inercal.records.read import source_of
-    from inercal.selfcal.filters.problem import problem
-    from inercal.selfcal.filters.run import load_kernels
-    from inercal.selfcal.monte_carlo import REFERENCES, campaign
+    from inercal.faces.python.study import read_study
+    from inercal.foundation._jit import compiling
+    from inercal.foundation.estimate.cluster import Cluster
+    from inercal.foundation.estimate.executors import Threads
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.findings import Status
+    from inercal.foundation.records.read import source_of
+    from inercal.systems.selfcal.filters.problem import problem
+    from inercal.systems.selfcal.filters.run import load_kernels
+    from inercal.systems.selfcal.monte_carlo import REFERENCES, campaign
 
     if not 2 <= runs <= _MOST_RUNS:
         raise InputError("--runs", f"found {runs}, expected 2 to {_MOST_RUNS:,}")
@@ -164,7 +164,7 @@ def _campaign(
     estimate = estimate if outcome.passed else replace(estimate, status=Status.INCONSISTENT)
 
     def page() -> str:
-        from inercal.selfcal.figures.monte_carlo import page as campaign_page
+        from inercal.systems.selfcal.figures.monte_carlo import page as campaign_page
 
         return campaign_page(outcome, settings, estimate)
 
@@ -173,7 +173,7 @@ def _campaign(
 
 def _check(study: Path, seed: int, output: FileOutput) -> None:
     """Fail before any work is done where a result could not be written."""
-    from inercal.records.write import SUFFIXES
+    from inercal.foundation.records.write import SUFFIXES
 
     if output.out is None:
         raise InputError("--out", "missing, expected the file to write, such as simulated.csv")
@@ -193,11 +193,11 @@ def _simulated(
     """Simulate, and write the record."""
     import numpy as np
 
-    from inercal.estimate.result import without_coefficients
-    from inercal.face.study import read_study
-    from inercal.face.verbs import simulate
-    from inercal.records.read import source_of
-    from inercal.records.write import write_record
+    from inercal.faces.python.study import read_study
+    from inercal.faces.python.verbs import simulate
+    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.records.read import source_of
+    from inercal.foundation.records.write import write_record
 
     _check(study, seed, output)
     assert output.out is not None

@@ -12,12 +12,12 @@ from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from inercal.errors import InputError, plain
-from inercal.selfcal.system import SYSTEM as SELFCAL
+from inercal.foundation.errors import InputError, plain
+from inercal.foundation.units import shown
 from inercal.systems.contract import System
 from inercal.systems.listed import SYSTEMS
-from inercal.turntable.system import SYSTEM as TURNTABLE
-from inercal.units import shown
+from inercal.systems.selfcal.system import SYSTEM as SELFCAL
+from inercal.systems.turntable.system import SYSTEM as TURNTABLE
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -103,9 +103,9 @@ class StoredLine:
         self, laid: LaidOut, study: Path | None, column_map: Path | None, table: Path | None
     ) -> Iterator[Path]:
         """The files that are named by others."""
-        from inercal.records.maps import read_map
-        from inercal.records.read import files_named as of_map
-        from inercal.studies.load import files_named as of_study
+        from inercal.faces.studies.load import files_named as of_study
+        from inercal.foundation.records.maps import read_map
+        from inercal.foundation.records.read import files_named as of_map
 
         if study is not None:
             keys = [laid.moved(key) for key in self.given.get("--set", ())]
@@ -114,7 +114,7 @@ class StoredLine:
             yield from of_study(self._system, study, keys, unread)
         runs = [[Path(laid.place(str(file))) for file in self.given.get("FILES", ())]]
         if table is not None:
-            from inercal.aoa.runs.run_table import read_runs_table
+            from inercal.systems.aoa.runs.run_table import read_runs_table
 
             runs = [[run.path] for run in read_runs_table(table).runs]
         for files in runs:

@@ -24,11 +24,11 @@ from inercal.cli.options import (
     Span,
     whole_number,
 )
-from inercal.errors import InputError, RecordError, UsageError
+from inercal.foundation.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
-    from inercal.stream.lines import Lines
-    from inercal.stream.run import Recursive
+    from inercal.faces.stream.lines import Lines
+    from inercal.faces.stream.run import Recursive
 
     Estimators = Callable[[Lines], Recursive[Any]]
 
@@ -46,7 +46,7 @@ Every = Annotated[
 
 def interval_of(every: str | None) -> float:
     """The interval [s] that `Every` states, 0 if absent; raises `InputError`."""
-    from inercal.units import parse_quantity
+    from inercal.foundation.units import parse_quantity
 
     interval = 0.0 if every is None else parse_quantity(every, "time", "--every").value
     if every is not None and interval <= 0.0:
@@ -72,7 +72,7 @@ class StreamOptions:
     @property
     def received(self) -> float:
         """Time [s] of the last line received, -inf if there is none; raises `InputError`."""
-        from inercal.units import parse_quantity
+        from inercal.foundation.units import parse_quantity
 
         return -math.inf if self.after is None else parse_quantity(self.after, "time", "--after").value
 
@@ -140,7 +140,7 @@ def stream_study(
     output: ResultOutput,
 ) -> None:
     """Run the estimator of a study on a stream; ``prepare`` takes its settings, the interval [s] and the output."""
-    from inercal.face.study import read_study
+    from inercal.faces.python.study import read_study
 
     span.refuse("a stream")
     file, interval = streamed(files), interval_of(every)
@@ -167,12 +167,12 @@ def run_stream(
 
     A reader that leaves ends it in order; the lines it did not take are given again after a restart.
     """
-    from inercal.stream.lines import Lines
-    from inercal.stream.run import Saving, run
+    from inercal.faces.stream.lines import Lines
+    from inercal.faces.stream.run import Saving, run
 
     record_map = None
     if map_file is not None:
-        from inercal.records.maps import read_map  # brings a checker of files that is slow to load
+        from inercal.foundation.records.maps import read_map  # brings a checker of files that is slow to load
 
         record_map = read_map(map_file)
     saving = None if options.checkpoint is None else Saving(options.checkpoint, options.checkpoint_every)

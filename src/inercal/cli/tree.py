@@ -12,7 +12,7 @@ from cyclopts.help import PlainFormatter
 
 from inercal import __version__
 from inercal.cli.tree_laboratory import LABORATORY
-from inercal.errors import UsageError
+from inercal.foundation.errors import UsageError
 
 if TYPE_CHECKING:
     from cyclopts.help import HelpPanel

@@ -11,10 +11,10 @@ from inercal.cli.outcome import WHOLE, hand_over
 
 def validate(*, output: ResultOutput = ResultOutput()) -> int:  # noqa: B008  (frozen)
     """Rerun the published and closed-form cases."""
-    from inercal._jit import compiling
-    from inercal.report.validation import page, table
-    from inercal.validate.run import executor
-    from inercal.validate.run import validate as run
+    from inercal.faces.report.validation import page, table
+    from inercal.faces.validate.run import executor
+    from inercal.faces.validate.run import validate as run
+    from inercal.foundation._jit import compiling
 
     output.check(WHOLE)
     with compiling("validate", output.say), reading(output, "validating") as progress:

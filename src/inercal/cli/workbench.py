@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from inercal.cli.options import Output, StoreOption
 from inercal.cli.outcome import timed
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 
 _PASSWORD = "INERCAL_WORKBENCH_PASSWORD"
 """Variable of the environment that holds the password for other machines."""
@@ -39,10 +39,10 @@ def workbench(
     """Serve the workbench until it is asked to end."""
     from platformdirs import user_data_path
 
-    from inercal.estimate.files import to_json
-    from inercal.estimate.result import without_coefficients
-    from inercal.workbench.bench import open_bench
-    from inercal.workbench.serve import HERE, Door, serve
+    from inercal.bench.workbench.bench import open_bench
+    from inercal.bench.workbench.serve import HERE, Door, serve
+    from inercal.foundation.estimate.files import to_json
+    from inercal.foundation.estimate.result import without_coefficients
 
     if not 0 <= port <= 65535:
         raise InputError("--port", f"found {port}, expected a number from 0 to 65535")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from inercal.inputs import Source
+    from inercal.foundation.inputs import Source
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -41,7 +41,7 @@ class Example:
 
 def shipped(file: str) -> Source:
     """A file of `FOLDER` as an input of a result: by its name in the package, which is the same wherever that lies."""
-    from inercal.records.read import source_of
+    from inercal.foundation.records.read import source_of
 
     return replace(source_of(FOLDER / file), path=f"{FOLDER.name}/{file}")
 

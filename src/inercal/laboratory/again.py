@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from inercal._files import read_bytes, write_bytes
-from inercal.errors import InputError, plain
-from inercal.estimate.result import Estimate
+from inercal.foundation._files import read_bytes, write_bytes
+from inercal.foundation.errors import InputError, plain
+from inercal.foundation.estimate.result import Estimate
 from inercal.laboratory.catalog import Shown
 from inercal.laboratory.store import Store
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Table, insert, select
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.chain import SCRUB, digest_of, happened, scrubbed, told
 from inercal.laboratory.check import check
 from inercal.laboratory.database import engine_of, migrate, reading, writing

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from inercal.arrays import Array
-from inercal.estimate.variances import solved, weighed
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.variances import solved, weighed
 from inercal.laboratory.wander import Series, prior_of
 
 Mask: TypeAlias = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from typing import Any
 
 from sqlalchemy import Connection, select, text
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT
 from inercal.laboratory.chain import BEGIN, digest_of, hash_of, scrubbed, told
 from inercal.laboratory.database import reading

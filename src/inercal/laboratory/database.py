@@ -12,8 +12,8 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, SQLAlchemyError
 from sqlalchemy.pool import NullPool
 
-from inercal.addresses import hidden_in
-from inercal.errors import InputError, MissingExtraError
+from inercal.foundation.addresses import hidden_in
+from inercal.foundation.errors import InputError, MissingExtraError
 
 if TYPE_CHECKING:
     from sqlalchemy import URL

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.errors import InputError
-from inercal.estimate.shown import units_shown
-from inercal.findings import Finding, Status
-from inercal.instruments.terms import shown_unit
+from inercal.foundation.arrays import Array
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.shown import units_shown
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.records.places import counted, counted_names
 from inercal.laboratory.chart import Chart, chart
 from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
 from inercal.laboratory.wander import Interval, Series, Wandering, wandering
-from inercal.records.places import counted, counted_names
 
 YEAR = 365.25
 """Days."""

@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.estimate.basis import Basis
-from inercal.estimate.formula import Formula
-from inercal.estimate.result import Estimate
-from inercal.estimate.rounding import rounded
-from inercal.estimate.table import aligned
-from inercal.inputs import Source
-from inercal.instruments.terms import term
+from inercal.faces.report.html import Picture
+from inercal.faces.report.html import page as template
+from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel
+from inercal.faces.report.panels import draw
+from inercal.faces.report.style import ALARM, COLOURS, QUIET
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.basis import Basis
+from inercal.foundation.estimate.formula import Formula
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.estimate.rounding import rounded
+from inercal.foundation.estimate.table import aligned
+from inercal.foundation.inputs import Source
+from inercal.foundation.instruments.terms import term
 from inercal.laboratory.chart import LIMIT, Mask
 from inercal.laboratory.history import HORIZON, REFERENCES, YEAR, Course, History
 from inercal.laboratory.specification import group_of
 from inercal.laboratory.wander import Interval
-from inercal.report.html import Picture
-from inercal.report.html import page as template
-from inercal.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel
-from inercal.report.panels import draw
-from inercal.report.style import ALARM, COLOURS, QUIET
 
 COMMAND = "history"
 

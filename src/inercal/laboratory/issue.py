@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from sqlalchemy import insert, select
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import writing

@@ -11,11 +11,11 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select
 
-from inercal.addresses import without_secrets
-from inercal.errors import InputError
-from inercal.estimate.files import plain_objects, to_json
-from inercal.estimate.result import Estimate
-from inercal.inputs import program
+from inercal.foundation.addresses import without_secrets
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import plain_objects, to_json
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.inputs import program
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import reading, writing
 from inercal.laboratory.store import Store

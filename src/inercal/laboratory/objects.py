@@ -12,9 +12,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from inercal._files import is_pipe, replacing
-from inercal.addresses import hidden_in
-from inercal.errors import InputError, MissingExtraError
+from inercal.foundation._files import is_pipe, replacing
+from inercal.foundation.addresses import hidden_in
+from inercal.foundation.errors import InputError, MissingExtraError
 
 _PIECE = 1 << 22
 """Bytes that are read at a time."""

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from inercal.addresses import shown_address
-from inercal.errors import InputError
+from inercal.foundation.addresses import shown_address
+from inercal.foundation.errors import InputError
 
 VARIABLE = "INERCAL_STORE"
 """Variable of the environment that says where the store is."""

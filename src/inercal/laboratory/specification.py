@@ -12,11 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from inercal.errors import InputError
-from inercal.units import parse_unit
+from inercal.foundation.errors import InputError
+from inercal.foundation.units import parse_unit
 
 if TYPE_CHECKING:
-    from inercal.estimate.result import Estimate
+    from inercal.foundation.estimate.result import Estimate
 
 Verdict = Literal["conform", "not conform"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from sqlalchemy import Engine, insert, select
 
-from inercal.addresses import holds_secret
-from inercal.errors import InputError
+from inercal.foundation.addresses import holds_secret
+from inercal.foundation.errors import InputError
 from inercal.laboratory.chain import digest_of, happened
 from inercal.laboratory.database import (
     VERSION,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sqlalchemy import insert, select
 
-from inercal.addresses import without_secrets
-from inercal.errors import InputError
+from inercal.foundation.addresses import without_secrets
+from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT, find
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import writing

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-    from inercal._toml import Strict
-    from inercal.arrays import Array
-    from inercal.designs.foresight import Foresight
-    from inercal.estimate.result import Estimate
-    from inercal.face.result import Result
-    from inercal.face.study import Study
-    from inercal.live.estimators import Make, Say, SayFinding
-    from inercal.records.record import Record
-    from inercal.validate.case import Case
+    from inercal.bench.live.estimators import Make, Say, SayFinding
+    from inercal.faces.python.result import Result
+    from inercal.faces.python.study import Study
+    from inercal.faces.validate.case import Case
+    from inercal.foundation._toml import Strict
+    from inercal.foundation.arrays import Array
+    from inercal.foundation.designs.foresight import Foresight
+    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.records.record import Record
 
 Channels = Collection[str]
 """Names of the channels of a recording."""
@@ -93,7 +93,7 @@ class System:
     complete: Callable[[Channels], bool] = lambda channels: False
     """True where canonical channels need no map."""
     guess: Mapping[str, Any] = field(default_factory=dict)
-    """Options of `inercal.records.guess.guess_map`."""
+    """Options of `inercal.foundation.records.guess.guess_map`."""
     counted: Callable[[Any], bool] = lambda settings: False
     """True of settings for which rows of a file need no times."""
 

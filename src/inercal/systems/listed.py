@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from inercal.aoa.system import SYSTEM as AOA
-from inercal.imu.system import SYSTEM as IMU
-from inercal.selfcal.system import SYSTEM as SELFCAL
-from inercal.strapdown.system import SYSTEM as STRAPDOWN
+from inercal.systems.aoa.system import SYSTEM as AOA
 from inercal.systems.contract import System
-from inercal.turntable.system import SYSTEM as TURNTABLE
+from inercal.systems.imu.system import SYSTEM as IMU
+from inercal.systems.selfcal.system import SYSTEM as SELFCAL
+from inercal.systems.strapdown.system import SYSTEM as STRAPDOWN
+from inercal.systems.turntable.system import SYSTEM as TURNTABLE
 
 SYSTEMS: Mapping[str, System] = {
     system.kind: system

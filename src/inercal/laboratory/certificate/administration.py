@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from inercal import __version__
-from inercal.instruments.reference_types import OTHERS, PREFIX, reference_types
+from inercal.foundation.instruments.reference_types import OTHERS, PREFIX, reference_types
 from inercal.laboratory.certificate.elements import dcc, optional, plain, words
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
+    from inercal.faces.studies.laboratory import PlaceTable
     from inercal.laboratory.certificate.lab import LabFile
-    from inercal.studies.laboratory import PlaceTable
 
 GENERAL = (
     (

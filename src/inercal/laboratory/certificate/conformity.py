@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from inercal.errors import InputError
+from inercal.foundation.errors import InputError
 from inercal.laboratory.certificate.elements import dcc, number, of_result, words
 from inercal.laboratory.specification import Conformity, Specification
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
-    from inercal.estimate.result import Estimate
+    from inercal.foundation.estimate.result import Estimate
 
 
 def limits_used(specification: Specification, estimates: Sequence[Estimate], where: object) -> None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from inercal.errors import InputError
-from inercal.instruments.dsi import as_written, dsi, is_coherent
+from inercal.foundation.errors import InputError
+from inercal.foundation.instruments.dsi import as_written, dsi, is_coherent
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -10,14 +10,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from inercal._toml import Strict, check, read_toml
-from inercal.errors import InputError
-from inercal.estimate.result import Estimate
-from inercal.laboratory.certificate.elements import plain
-from inercal.studies.commented import commented
-from inercal.studies.common import Conditions, ConditionsTable
-from inercal.studies.fields import refusal
-from inercal.studies.laboratory import (
+from inercal.faces.studies.commented import commented
+from inercal.faces.studies.common import Conditions, ConditionsTable
+from inercal.faces.studies.fields import refusal
+from inercal.faces.studies.laboratory import (
     Day,
     Equipment,
     EquipmentTable,
@@ -27,10 +23,14 @@ from inercal.studies.laboratory import (
     PlaceTable,
     Tolerances,
 )
-from inercal.studies.load import put
-from inercal.studies.schema import TomlSchema
-from inercal.studies.starting import UNKNOWN
-from inercal.units import shown
+from inercal.faces.studies.load import put
+from inercal.faces.studies.schema import TomlSchema
+from inercal.faces.studies.starting import UNKNOWN
+from inercal.foundation._toml import Strict, check, read_toml
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.units import shown
+from inercal.laboratory.certificate.elements import plain
 
 
 class PersonTable(Strict):

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from inercal.errors import QuantityError
-from inercal.estimate.rounding import rounded
-from inercal.instruments.dsi import dsi
-from inercal.instruments.terms import shown_unit
+from inercal.faces.report.style import plain_unit
+from inercal.foundation.errors import QuantityError
+from inercal.foundation.estimate.rounding import rounded
+from inercal.foundation.instruments.dsi import dsi
+from inercal.foundation.instruments.terms import shown_unit
 from inercal.laboratory.certificate.elements import NAMESPACES
 from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, quantities_of, text
-from inercal.report.style import plain_unit
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -9,8 +9,8 @@ from xml.parsers import expat
 
 from lxml import etree
 
-from inercal._files import read_bytes
-from inercal.errors import InputError
+from inercal.foundation._files import read_bytes
+from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -14,17 +14,17 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
-from inercal.arrays import Array
-from inercal.errors import InputError
-from inercal.estimate.files import parse
-from inercal.estimate.result import COVERAGE, Estimate, coverage_factor
-from inercal.findings import Status
-from inercal.instruments.dsi import as_written, from_dsi
-from inercal.instruments.reference_types import PREFIX
+from inercal.foundation.arrays import Array
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import parse
+from inercal.foundation.estimate.result import COVERAGE, Estimate, coverage_factor
+from inercal.foundation.findings import Status
+from inercal.foundation.instruments.dsi import as_written, from_dsi
+from inercal.foundation.instruments.reference_types import PREFIX
+from inercal.foundation.units import shown
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES
 from inercal.laboratory.certificate.parsing import parsed, tree_of
 from inercal.laboratory.certificate.schema import VERSION, fault
-from inercal.units import shown
 
 if TYPE_CHECKING:
     from lxml.etree import _Element

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.arrays import Array
-from inercal.errors import InputError
-from inercal.estimate.files import to_json
-from inercal.estimate.result import COVERAGE, Estimate, coverage_factor
-from inercal.instruments.dsi import as_written, dsi, from_dsi, is_coherent
-from inercal.instruments.reference_types import PREFIX, reference_type
-from inercal.instruments.terms import term
+from inercal.foundation.arrays import Array
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.files import to_json
+from inercal.foundation.estimate.result import COVERAGE, Estimate, coverage_factor
+from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent
+from inercal.foundation.instruments.reference_types import PREFIX, reference_type
+from inercal.foundation.instruments.terms import term
 from inercal.laboratory.certificate.administration import software
 from inercal.laboratory.certificate.conformity import stated
 from inercal.laboratory.certificate.elements import (
@@ -33,11 +33,11 @@ from inercal.laboratory.certificate.elements import (
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
-    from inercal.estimate.result import Parameter
+    from inercal.faces.studies.laboratory import EquipmentTable
+    from inercal.foundation.estimate.result import Parameter
+    from inercal.foundation.units import Quantity
     from inercal.laboratory.certificate.lab import LabFile
     from inercal.laboratory.specification import Conformity
-    from inercal.studies.laboratory import EquipmentTable
-    from inercal.units import Quantity
 
 KELVIN = 273.15
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 from lxml import etree
 
-from inercal.addresses import without_secrets
-from inercal.errors import InputError
-from inercal.estimate.result import Estimate
-from inercal.findings import Status
+from inercal.foundation.addresses import without_secrets
+from inercal.foundation.errors import InputError
+from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.findings import Status
+from inercal.foundation.units import shown
 from inercal.laboratory.certificate.administration import administrative
 from inercal.laboratory.certificate.conformity import limits_used, statement
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES, XSI, plain
@@ -18,7 +19,6 @@ from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
 from inercal.laboratory.certificate.results import measured
 from inercal.laboratory.certificate.schema import VERSION, fault
 from inercal.laboratory.specification import Conformity, Specification, judged, specification_of
-from inercal.units import shown
 
 
 def certificate(

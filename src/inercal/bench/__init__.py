@@ -1,0 +1,1 @@
+"""The commands in a browser, and an instrument by wire."""

@@ -1,0 +1,269 @@
+"""Measurements of sessions: instruments by wire, measured in threads of this process, one at most for each session.
+
+They go on when a page is closed, and end with the workbench; what was recorded until then stays, in the folder ``live``
+of the session.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+import shutil
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from inercal.bench.live.address import Mqtt, Pieces, Replay, Sink, Source, Text, sink_of, source_of
+from inercal.bench.live.feed import frame_of
+from inercal.bench.live.measurement import Measurement, Plan
+from inercal.bench.workbench.rest_detector import Rest
+from inercal.bench.workbench.sessions import MAP, STUDY, Session, Sessions, safe_name
+from inercal.foundation.errors import InercalError, InputError, plain
+from inercal.foundation.records.maps import read_map
+from inercal.systems.listed import SYSTEMS
+
+if TYPE_CHECKING:
+    from inercal.bench.live.estimators import Make, Say, SayFinding
+
+FOLDER = "live"
+"""Folder of recordings and sinks in that of a session."""
+
+MEASURED = {kind: system.streams for kind, system in SYSTEMS.items() if system.stream}
+"""Quantities that a study of each kind measures."""
+
+MOST = 4
+"""Measurements that may be at work at the same time."""
+
+_PATIENCE = 10.0
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A wish for a measurement: address of the ``source``, name of a new file to ``record`` raw rows in (empty for
+    none), sinks to send the rows ``to``, and the interval [s] of these rows ``every``, 0 for one each sample."""
+
+    source: str
+    record: str = ""
+    to: tuple[str, ...] = ()
+    every: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Live:
+    """A measurement of a session as it was wished for, the rest detector beside it, and the command that does the
+    same."""
+
+    wish: Wish
+    measurement: Measurement
+    rest: Rest
+    command: str
+    recording: Path | None
+
+    @property
+    def gone(self) -> bool:
+        """True while a source that died is tried again; a recording that was read to its end is not gone."""
+        of, replayed = self.measurement, self.wish.source.lower().startswith("replay:")
+        return of.state in ("waiting", "running") and not (of.alive or replayed)
+
+    @property
+    def ended(self) -> bool:
+        """True once it is over."""
+        return self.measurement.state == "ended"
+
+
+class Measurements:
+    """All measurements that this workbench has begun, the last one of each session."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, Live] = {}
+        self._lock = threading.Lock()
+
+    def of(self, session: Session) -> Live | None:
+        """The measurement of a session, None without one."""
+        return self._held.get(session.id)
+
+    @property
+    def at_work(self) -> dict[str, Live]:
+        """Measurements that have not ended, by session."""
+        return {number: live for number, live in self._held.items() if not live.ended}
+
+    def begin(self, session: Session, wish: Wish) -> Live:
+        """Begin to measure; raises `InputError` where an address, study or map is wrong, or another is at work."""
+        with self._lock:
+            before = self.of(session)
+            if before is not None and not before.ended:
+                raise InputError(session.title, "is measured already, expected that to be stopped first")
+            if len(self.at_work) >= MOST:
+                raise InputError(
+                    session.title,
+                    f"found {MOST} measurements at work, expected one of them to be stopped first",
+                )
+            live = _prepared(session, wish)
+            live.measurement.start()
+            self._held[session.id] = live
+        return live
+
+    def stop(self, session: Session) -> Live:
+        """Ask a measurement to end in order; raises `InputError` where there is none."""
+        live = self.of(session)
+        if live is None:
+            raise InputError(session.title, "is not measured")
+        live.measurement.stop()
+        return live
+
+    def drop(self, session: Session) -> None:
+        """End the measurement of a session, if there is one, and forget it."""
+        live = self._held.pop(session.id, None)
+        if live is not None:
+            live.measurement.stop(_PATIENCE)
+
+    def close(self) -> None:
+        """End all measurements."""
+        for live in self.at_work.values():
+            live.measurement.stop()
+        for live in self._held.values():
+            if live.measurement.state != "new":
+                live.measurement.join(_PATIENCE)
+
+
+def interval_of(text: str) -> float:
+    """The interval [s] of rows that was typed, such as "0.1 s", 0 for nothing; raises `InputError`."""
+    from inercal.foundation.units import parse_quantity
+
+    found = parse_quantity(text, "time", "interval").value if text else 0.0
+    if text and not 0.0 < found < math.inf:
+        raise InputError("interval", f"found {text}, expected a time above 0")
+    return found
+
+
+def _prepared(session: Session, wish: Wish) -> Live:
+    """A measurement that has not begun; raises `InputError`."""
+    from inercal.bench.live.estimators import of_study
+    from inercal.faces.python.study import read_study
+
+    if session.study is None:
+        raise InputError(session.title, "found no study, expected one that says what is measured")
+    if not 0.0 <= wish.every < math.inf:
+        raise InputError("every", f"found {wish.every}, expected a time from 0 on")
+    for where, text in (
+        ("source", wish.source),
+        ("record", wish.record),
+        *(("to", each) for each in wish.to),
+    ):
+        plain(where, text)
+    study = read_study(session.kind, session.study)
+    folder = session.folder / FOLDER
+    typed = [sink_of(each) for each in wish.to]
+    source = _own_source(source_of(wish.source), session.folder)
+    sinks = [_own_sink(each, session.folder) for each in typed]
+    recording = folder / safe_name(wish.record) if wish.record else None
+    places = [recording, *(getattr(each, "file", None) or getattr(each, "folder", None) for each in sinks)]
+    names = [place for place in places if place is not None]
+    if len(set(names)) < len(names) or len(set(map(str, sinks))) < len(sinks):
+        raise InputError("to", "found one place for two things, expected a name for each")
+    for place in names:
+        if place.exists():
+            raise InputError(place.name, "is there already, expected the name of a new file")
+    folder.mkdir(exist_ok=True)
+    rest = Rest()
+
+    def make(say: Say, say_finding: SayFinding) -> Make:
+        return rest.beside(of_study(study, wish.every, say, say_finding))
+
+    record_map = None if session.map is None else read_map(session.map)
+    measurement = Measurement(Plan(source, make, record_map, recording, sinks))
+    return Live(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
+
+
+def _own_source(source: Source, folder: Path) -> Source:
+    """The source with its files in the folder of the session; raises `InputError` for a file elsewhere."""
+    match source:
+        case Replay():
+            return replace(source, file=_there(source.file, folder))
+        case Mqtt():
+            return _own_broker(source, folder)
+        case _:
+            return source
+
+
+def _own_broker(broker: Mqtt, folder: Path) -> Mqtt:
+    """The topic with its files in the folder of the session."""
+    ca, login = (None if path is None else _there(path, folder) for path in (broker.ca, broker.login))
+    return replace(broker, ca=ca, login=login)
+
+
+def _there(path: Path, folder: Path) -> Path:
+    """A file of the session, or of its folder ``live``; raises `InputError`."""
+    name = path.name
+    for typed, place in ((name, folder), (f"{FOLDER}/{name}", folder / FOLDER)):
+        with suppress(InputError):
+            if str(path) == typed and safe_name(name) == name and (place / name).is_file():
+                return place / name
+    raise InputError(str(path), "is no file of this session, expected the name of one that was added to it")
+
+
+def _own_sink(sink: Sink, folder: Path) -> Sink:
+    """The sink with its file or folder in the folder ``live`` of the session; raises `InputError`."""
+    match sink:
+        case Text(file=None):
+            raise InputError("to", "found text:-, expected a file, for a page has no standard output")
+        case Text(file=Path() as file):
+            return Text(folder / FOLDER / _plain(file))
+        case Pieces():
+            return replace(sink, folder=folder / FOLDER / _plain(sink.folder))
+        case Mqtt():
+            return _own_broker(sink, folder)
+        case _:
+            return sink
+
+
+def _plain(path: Path) -> str:
+    """A name without any folder; raises `InputError`."""
+    if safe_name(str(path)) != str(path):
+        raise InputError(str(path), "is no plain name, expected one without folders")
+    return str(path)
+
+
+def _command(session: Session, wish: Wish, sinks: Sequence[Sink], recording: Path | None) -> str:
+    """The command that does the same in the folder of the session."""
+    words = ["inercal", "live", wish.source, "--study", STUDY]
+    words += ["--map", MAP] if session.map is not None else []
+    words += ["--record", f"{FOLDER}/{recording.name}"] if recording is not None else []
+    for typed, sink in zip(wish.to, sinks, strict=True):
+        own = isinstance(sink, Text | Pieces)
+        words += ["--to", typed.replace(":", f":{FOLDER}/", 1) if own else typed]
+    words += ["--every", f"{wish.every:g} s"] if wish.every else []
+    return shlex.join(words)
+
+
+def next_name(session: Session) -> str:
+    """A name for the next recording that no file has yet."""
+    ending = ".csv"
+    if session.map is not None:
+        with suppress(InercalError):
+            ending = ".bin" if frame_of(read_map(session.map)) is not None else ".csv"
+    number = 1
+    while (session.folder / FOLDER / f"live-{number}{ending}").exists():
+        number += 1
+    return f"live-{number}{ending}"
+
+
+def recordings(session: Session) -> list[Path]:
+    """Files that measurements have recorded or written, in the order of the names."""
+    folder = session.folder / FOLDER
+    return sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
+
+
+def begun_with(sessions: Sessions, session: Session, name: str) -> Session:
+    """A new session with a recording of a measurement, and the map and study of its session; raises `InputError`."""
+    source = session.folder / FOLDER / safe_name(name)
+    if safe_name(name) != name or not source.is_file():
+        raise InputError(name, "is no recording of this session")
+    new = sessions.begin(name, session.kind)
+    for path in (source, session.map, session.study):
+        if path is not None:
+            shutil.copyfile(path, new.folder / path.name)
+    return new

@@ -1,0 +1,1 @@
+"""What people and programs meet: study files, pages, streams, verbs of Python, conversion, validation."""

@@ -1,0 +1,359 @@
+"""The study of ``inercal calibrate imu``, by any of its methods."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from inercal.faces.studies.common import (
+    Conditions,
+    ConditionsTable,
+    SiteTable,
+    Traceability,
+    TraceabilityTable,
+    Version,
+    site_of,
+)
+from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
+from inercal.faces.studies.fields import QuantityText, refusal
+from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.faces.studies.laboratory import (
+    Equipment,
+    Item,
+    ItemTable,
+    Laboratory,
+    LaboratoryTable,
+    Tolerances,
+    traced,
+)
+from inercal.faces.studies.rig import RigTable, chain_of
+from inercal.faces.studies.tables import as_typed, settings_of, table_of
+from inercal.foundation._toml import Strict, check
+from inercal.foundation.errors import StudyError
+from inercal.foundation.instruments.terms import (
+    ACCELEROMETER_TRIAD,
+    ACCELEROMETERS_IN_A_FRAME,
+    GYRO_G_SENSITIVITY,
+    GYRO_TRIAD,
+)
+from inercal.foundation.units import Quantity, parse_unit, shown
+from inercal.systems.imu.settings import (
+    TILT,
+    TURN,
+    AidedSettings,
+    Disturbances,
+    Exclusion,
+    ImuSettings,
+    KnownRatesSettings,
+    KnownTurnsSettings,
+    MeansSettings,
+    Method,
+    Simulation,
+    mounting_of,
+)
+
+SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+class AidedTable(Strict):
+    """Reference-aided calibration: the table, and the instrument on it."""
+
+    rig: RigTable = Field(
+        default=RigTable(kind="two_axis_turntable"),
+        title="Rig",
+        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
+        "its azimuth unknown unless given",
+    )
+    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
+        default=("+x", "+y", "+z"),
+        examples=[["+x", "+y", "+z"]],
+        description="axes of the table, at zero angles, along which the instrument's x, y and z point",
+    )
+
+    @model_validator(mode="after")
+    def _right_handed(self) -> AidedTable:
+        """Refuse axes that make no frame."""
+        if mounting_of(self.mounting) is None:
+            raise refusal(
+                f"found the mounting {', '.join(self.mounting)}, expected three axes that make a right-handed frame"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _no_limits(self) -> AidedTable:
+        """Refuse what would change nothing."""
+        if self.rig.limits.model_fields_set:
+            raise refusal("found rig.limits, expected none: the angles are those of the record")
+        return self
+
+
+def aided_settings(table: AidedTable, where: object) -> AidedSettings:
+    """Put the table in SI.
+
+    Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
+    """
+    azimuth = table.rig.base.azimuth
+    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
+    return AidedSettings(chain, None if azimuth is None else azimuth.u)
+
+
+#: keys that not all methods heed -> those that do
+_METHODS = {
+    "static_start": ("multiposition",),
+    "g_sensitivity": ("multiposition", "aided"),
+    "bias_drift": ("multiposition",),
+    "exclude": ("multiposition", "means", "known_rates"),
+    "k2": ("multiposition", "ferraris", "means", "aided"),
+    "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
+    "rates": ("known_rates",),
+    "turns": ("known_turns",),
+    "alignment": ("known_turns",),
+    "ferraris": ("ferraris",),
+    "aided": ("aided",),
+}
+
+
+def _left(value: object) -> object:
+    """A time or a pose to be left out, as text."""
+    if isinstance(value, str):
+        if re.fullmatch(r"pose [1-9]\d*", value.strip()):
+            return value
+        begin, dots, end = value.partition("..")
+        if dots and seconds_of(begin.strip()) < seconds_of(end.strip()):
+            return value
+    raise refusal(
+        f'found {shown(value)}, expected a time, such as "249 s .. 253 s", or a pose, such as "pose 12"'
+    )
+
+
+Left = Annotated[str, BeforeValidator(_left)]
+
+
+def exclusion_of(texts: list[str]) -> Exclusion:
+    """The parts of a recording to be left out, of texts that were read well."""
+    poses = tuple(int(text.split()[1]) for text in texts if ".." not in text)
+    ends = [text.split("..") for text in texts if ".." in text]
+    times = tuple((seconds_of(begin.strip()), seconds_of(end.strip())) for begin, end in ends)
+    return Exclusion(times, poses)
+
+
+Rate = Annotated[Quantity, QuantityText("rate", "33.333(15) rpm")]
+
+TurnAngle = Annotated[Quantity, QuantityText("angle", "361.338(5) deg", TURN.accept, TURN.words)]
+
+
+class TurnsTable(Strict):
+    """Angles of three turns, positive about the positive axis by the right-hand rule."""
+
+    x: TurnAngle = Field(description="angle of the turn about x, perhaps with its standard uncertainty")
+    y: TurnAngle = Field(description="angle of the turn about y")
+    z: TurnAngle = Field(description="angle of the turn about z")
+
+
+class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
+    """Settings of the calibration."""
+
+    method: Literal["multiposition", "ferraris", "aided", "means", "known_rates", "known_turns"] = Field(
+        default="multiposition",
+        description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
+        "turns by a known angle; aided: on a table whose angles are in the record; means: a row of mean outputs for "
+        "each pose, accelerometers; known_rates: a gyro on a platter or rate table, in unknown orientations; "
+        "known_turns: a gyro, a turn by a known angle about each axis",
+    )
+    rates: list[Rate] = Field(
+        default=[],
+        examples=[["0 rpm", "33.333(15) rpm", "45.00(2) rpm"]],
+        description="of known_rates: rate of the table in each FILE, in their order",
+    )
+    turns: TurnsTable | None = Field(
+        default=None,
+        title="Turns",
+        examples=[{"x": "361.338(5) deg", "y": "367.160(5) deg", "z": "363.670(5) deg"}],
+        description="of known_turns: angle of the turn in each FILE, or in the rows of each label",
+    )
+    alignment: Annotated[Quantity, QuantityText("angle", "0.1 deg", TILT.accept, TILT.words)] | None = Field(
+        default=None,
+        description="of known_turns: standard uncertainty of the direction of the axis of each turn; taken as square "
+        "to each other if absent",
+    )
+    k2: bool | Typed = Field(
+        default=False,
+        description="second-order coefficients of the accelerometers, K1 (f + K2 f^2), f along the input axis: true to "
+        "estimate them, or 0 with the standard uncertainty they have where they are not; by default 30 ug/g^2 where "
+        "the mean specific force scatters by 20 ug at most from pose to pose, else 150 ug/g^2",
+        examples=["0(50) ug/g^2"],
+    )
+    exclude: list[Left] = Field(
+        default=[],
+        examples=[["249 s .. 253 s", "pose 12"]],
+        description="what no fit uses: turns that a time of the record's clock touches and poses of which it holds the "
+        "middle, and poses by their numbers, which stay as without this key; of known_rates orientations, counted "
+        "through all files",
+    )
+    ferraris: FerrarisTable = Field(
+        default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
+    )
+    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+
+    @model_validator(mode="after")
+    def _of_the_method(self) -> ImuTable:
+        """Refuse what the method does not heed."""
+        for key in ("rates", "turns"):
+            if self.method == f"known_{key}" and not getattr(self, key):
+                raise refusal(f"{key}: missing, expected it with method = {self.method!r}")
+        for key in self.model_fields_set - {"method"}:
+            methods = _METHODS.get(key, ())
+            if methods and self.method not in methods:
+                raise refusal(
+                    f"{key}: found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
+                )
+        return self
+
+
+#: keys of simulations that not all methods heed -> those that do
+_SIMULATED = {
+    "poses": ("multiposition",),
+    "start": ("multiposition", "aided"),
+    "restless_start": ("multiposition", "ferraris"),
+    "lever_arm": ("aided",),
+    "delay": ("aided",),
+}
+
+
+class ImuDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
+    """Disturbances that a simulation adds to a recording; none if absent."""
+
+    k2: Typed | None = Field(
+        default=None, description="second-order coefficient of all accelerometers", examples=["30 ug/g^2"]
+    )
+
+
+class SimulationTable(table_of(Simulation)):  # type: ignore[misc]
+    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table."""
+
+    coefficients: dict[str, Typed] = Field(
+        default_factory=dict,
+        description="true values of terms by symbol, outputs in counts; those that are absent are drawn",
+        examples=[{"K1_x": "4000 count/g"}],
+    )
+
+
+class ImuStudyFile(Strict):
+    """A study for ``inercal calibrate imu``."""
+
+    version: Version = 1
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
+    imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
+    simulation: SimulationTable = Field(
+        default=SimulationTable(), title="Simulation", description="a simulated recording"
+    )
+    disturbances: ImuDisturbancesTable = Field(
+        default=ImuDisturbancesTable(),
+        title="Disturbances",
+        description="what a simulation adds to the model",
+    )
+    item: Item = ItemTable()
+    laboratory: Laboratory = LaboratoryTable()
+    equipment: Equipment
+    specification: Tolerances
+    traceability: Traceability = TraceabilityTable()
+    conditions: Conditions = ConditionsTable()
+
+    @model_validator(mode="after")
+    def _of_the_method(self) -> ImuStudyFile:
+        """Refuse what the simulation of the method does not heed."""
+        for table, given in (("simulation", self.simulation), ("disturbances", self.disturbances)):
+            for key in sorted(given.model_fields_set):
+                methods = _SIMULATED.get(key, ())
+                if methods and self.imu.method not in methods:
+                    raise refusal(
+                        f"{table}.{key}: found with method = {self.imu.method!r}, expected it with "
+                        f"{' or '.join(methods)} only"
+                    )
+        return self
+
+
+def _method(table: ImuTable, path: str | Path) -> Method | None:
+    """The options of a method other than multi-position, in SI."""
+    match table.method:
+        case "ferraris":
+            return ferraris_settings(table.ferraris)
+        case "aided":
+            return aided_settings(table.aided, path)
+        case "means":
+            return MeansSettings()
+        case "known_rates":
+            return KnownRatesSettings(
+                tuple(rate.value for rate in table.rates), tuple(rate.u for rate in table.rates)
+            )
+        case "known_turns":
+            assert table.turns is not None
+            x, y, z = table.turns.x, table.turns.y, table.turns.z
+            alignment = None if table.alignment is None else table.alignment.value
+            return KnownTurnsSettings((x.value, y.value, z.value), (x.u, y.u, z.u), alignment)
+    return None
+
+
+def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
+    """True where K2 is estimated, and its standard deviation about 0 [1/(m/s^2)] where that is stated."""
+    if isinstance(table.k2, bool):
+        if table.k2 and table.method == "ferraris":
+            raise StudyError(
+                path,
+                "imu.k2: found true with method = 'ferraris', expected \"0(50) ug/g^2\": its six "
+                "positions do not tell K2 from K0",
+            )
+        return table.k2, None
+    if table.method == "aided":
+        raise StudyError(path, "imu.k2: found an uncertainty with method = 'aided', expected true or false")
+    value, u = coefficient_of(table.k2, "K2_x", "accelerometer", parse_unit("count"), gravity, "imu.k2", path)
+    if value != 0.0:
+        raise StudyError(
+            path,
+            f'imu.k2: found {shown(table.k2)}, expected true or 0 with an uncertainty, such as "0(50) ug/g^2"',
+        )
+    return False, u
+
+
+def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
+    """A study in SI, of its parsed TOML ``data``; raises `StudyError` for the first thing wrong, naming file and key.
+
+    ``path`` is where it came from; files that the study names lie beside it.
+    """
+    file = check(ImuStudyFile, data, path, StudyError)
+    site, count = site_of(file.site, path), parse_unit("count")
+    known = (
+        *(ACCELEROMETER_TRIAD if file.imu.method == "multiposition" else ACCELEROMETERS_IN_A_FRAME),
+        *GYRO_TRIAD,
+        *GYRO_G_SENSITIVITY,
+    )
+    truth = {}
+    for symbol, text in file.simulation.coefficients.items():
+        key = f"simulation.coefficients.{symbol}"
+        check_symbol(symbol, known, key, path)
+        kind = "accelerometer" if symbol in ACCELEROMETERS_IN_A_FRAME else "gyro"
+        truth[symbol], _ = coefficient_of(text, symbol, kind, count, site.gravity, key, path)
+    other, k2 = file.disturbances, 0.0
+    if other.k2 is not None:
+        k2, _ = coefficient_of(
+            other.k2, "K2_x", "accelerometer", count, site.gravity, "disturbances.k2", path
+        )
+    fitted, k2_u = _k2(file.imu, site.gravity, path)
+    return settings_of(
+        ImuSettings,
+        file.imu,
+        k2=fitted,
+        k2_u=k2_u,
+        site=site,
+        simulation=settings_of(Simulation, file.simulation, coefficients=truth),
+        disturbances=settings_of(Disturbances, other, k2=k2),
+        traceability=traced(file.traceability.model_dump(), file.item),
+        method=_method(file.imu, path),
+        temperature=file.conditions.temperature,
+        exclude=exclusion_of(file.imu.exclude),
+        given=as_typed(data),
+    )

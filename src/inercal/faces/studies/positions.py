@@ -1,0 +1,223 @@
+"""Positions of a table in a study: a grid, a plan by its name, a list, or a file."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
+
+from inercal.faces.studies.fields import refusal
+from inercal.faces.studies.rig import Angle, Limits
+from inercal.faces.studies.starting import POSITIONS
+from inercal.foundation._toml import Strict
+from inercal.foundation.arrays import Array
+from inercal.foundation.designs.allowed import within
+from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.records.read import read
+from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.rigs.plans import NAMED, Plan, grid, listed, named
+from inercal.foundation.units import shown
+
+MOST = 200_000
+"""Positions of a grid that fit into memory with all their indices."""
+
+_JOINTS = ("phi1", "phi2", "phi3")
+
+Count = Annotated[StrictInt, Field(ge=1)]
+
+
+def _known_plan(name: object) -> object:
+    """Refuse a name that no plan has, with the nearest one."""
+    if isinstance(name, str) and name not in NAMED:
+        near = difflib.get_close_matches(name[:80], NAMED, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"expected {', '.join(NAMED[:-1])} or {NAMED[-1]}"
+        raise refusal(f"found {shown(name)}, {hint}")
+    return name
+
+
+PlanName = Annotated[str, BeforeValidator(_known_plan), Field(json_schema_extra={"enum": list(NAMED)})]
+
+
+class GridTable(Strict):
+    """Combinations of evenly spaced angles over full circles, the outer axis slowest."""
+
+    phi1: Count = Field(description="number of outer angles", examples=[36])
+    phi2: Count | None = Field(
+        default=None, description="number of angles of the next axis, where there is one", examples=[36]
+    )
+    phi3: Count | None = Field(default=None, description="number of inner angles of a three-axis table")
+    offset: Literal["half", "none"] = Field(
+        default="half", description="start half a step from zero, clear of singular attitudes, or at zero"
+    )
+
+
+class PositionsTable(Strict):
+    """The positions to analyse, simulate or calibrate at: one of four."""
+
+    grid: GridTable | None = Field(
+        default=None,
+        title="Grid",
+        description="numbers of evenly spaced angles; offset none starts at zero",
+        examples=[{"phi1": 36, "phi2": 36, "offset": "half"}],
+    )
+    plan: PlanName | None = Field(default=None, description="instead: a plan of a two-axis table by its name")
+    list_: list[list[Angle]] | None = Field(
+        default=None,
+        alias="list",
+        min_length=1,
+        description="instead: the angles of each position",
+        examples=[[["0 deg", "45 deg"]]],
+    )
+    file: str | None = Field(
+        default=None,
+        min_length=1,
+        description="instead: a CSV beside the study with the header phi1 [deg],phi2 [deg] and a position a row",
+        examples=["positions.csv"],
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> PositionsTable:
+        """Refuse two ways at once."""
+        ways = dict(zip(POSITIONS, (self.grid, self.plan, self.list_, self.file), strict=True))
+        given = [name for name, way in ways.items() if way is not None]
+        if len(given) > 1:
+            raise refusal(f"found {' and '.join(given)}, expected one of them")
+        return self
+
+
+#: the grid where a study gives none, by number of joints
+_USUAL: Mapping[int, tuple[int, ...]] = {1: (36,), 2: (36, 36), 3: (12, 12, 12)}
+
+
+def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) -> Plan:
+    """The positions of a study [rad]; those of a grid that the axes reach.
+
+    Raises `StudyError` for a plan that is not for this table, a list or a file that does not fit its joints, a file
+    that cannot be read, or a position beyond a limit.
+    """
+    if table.plan is not None:
+        key, plan = f"positions.plan {table.plan}", _named(table.plan, chain, "positions.plan", where)
+    elif table.list_ is not None:
+        key, plan = "positions.list", listed(_rows(table.list_, chain, where))
+    elif table.file is not None:
+        key, plan = f"positions.file {shown(table.file)}", _of_file(table.file, chain, where)
+    else:
+        return grid_of(table.grid, chain, limits, "positions.grid", where, half=True)
+    inside, angles = _reached(plan, chain, limits)
+    if not inside.all():
+        first = int(np.argmin(inside))
+        place = ", ".join(f"{math.degrees(angle):.6g} deg" for angle in plan.angles[first])
+        raise StudyError(
+            where,
+            f"{key}: found position {first + 1} ({place}) beyond rig.limits, expected all within",
+        )
+    return Plan(plan.name, angles)
+
+
+def grid_of(
+    table: GridTable | None,
+    chain: Chain,
+    limits: Limits,
+    key: str,
+    where: object,
+    half: bool,
+) -> Plan:
+    """The positions of a grid that the axes reach; where none is given, of the usual one, ``half`` a step off or not.
+
+    Raises `StudyError` for a grid that does not fit the joints, is too large, or has no position within the limits.
+    """
+    counts = _USUAL[len(chain.joints)]
+    if table is not None:
+        by_joint = {"phi1": table.phi1, "phi2": table.phi2, "phi3": table.phi3}
+        given = {joint: count for joint, count in by_joint.items() if count is not None}
+        if tuple(given) != chain.joints:
+            raise StudyError(where, f"{key}: found {', '.join(given)}, expected {', '.join(chain.joints)}")
+        counts, half = tuple(given.values()), table.offset == "half"
+    if math.prod(counts) > MOST:
+        raise StudyError(where, f"{key}: found {math.prod(counts)} positions, expected at most {MOST}")
+    whole = grid(counts, half)
+    inside, angles = _reached(whole, chain, limits)
+    if not inside.any():
+        raise StudyError(where, f"{key}: found no position within rig.limits, expected a finer grid")
+    return Plan(whole.name if inside.all() else f"{whole.name} within limits", angles[inside])
+
+
+def compared(names: Sequence[str] | None, chain: Chain, limits: Limits, where: object) -> tuple[str, ...]:
+    """Named plans to set beside a design: those asked for, or all that the table can take.
+
+    Raises `StudyError` for a plan that the table cannot take.
+    """
+    if names is None:
+        names = [
+            name for name in NAMED if len(chain.joints) == 2 and _reached(named(name), chain, limits)[0].all()
+        ]
+    for name in names:
+        if not _reached(_named(name, chain, "design.compare", where), chain, limits)[0].all():
+            raise StudyError(
+                where, f"design.compare: found {name!r}, which goes beyond rig.limits, expected others"
+            )
+    return tuple(names)
+
+
+def _reached(plan: Plan, chain: Chain, limits: Limits) -> tuple[NDArray[np.bool_], Array]:
+    """Positions (n,) that the axes reach, and angles (n, joints) whole turns away that lie within the limits."""
+    ranges = [limits.get(joint) for joint in chain.joints]
+    angles = plan.angles.copy()
+    for k, ends in enumerate(ranges):
+        if ends is not None:
+            low, high = ends
+            beyond = (angles[:, k] < low) | (angles[:, k] > high)
+            angles[beyond, k] = low + np.mod(angles[beyond, k] - low, 2.0 * np.pi)
+    return within(plan.angles, ranges), angles
+
+
+def _named(name: str, chain: Chain, key: str, where: object) -> Plan:
+    """A named plan, if the table has two axes."""
+    if len(chain.joints) != 2:
+        raise StudyError(
+            where, f"{key}: found {name!r}, a plan of a two-axis table, expected a grid or a list"
+        )
+    return named(name)
+
+
+def _rows(rows: Sequence[Sequence[Any]], chain: Chain, where: object) -> list[list[float]]:
+    """The angles of a list [rad], as many as there are joints."""
+    for k, row in enumerate(rows):
+        if len(row) != len(chain.joints):
+            raise StudyError(
+                where,
+                f"positions.list.{k}: found {len(row)} angles, expected {', '.join(chain.joints)}",
+            )
+    return [[angle.value for angle in row] for row in rows]
+
+
+def _of_file(name: str, chain: Chain, where: object) -> Plan:
+    """The positions in a file, whose path is taken from the folder of the study."""
+    path = Path(str(where)).parent / name
+    key = f"positions.file: {shown(name)}"
+    head = ",".join(f"{joint} [deg]" for joint in chain.joints)
+    if not path.exists():
+        raise StudyError(
+            where, f"{key}: no such file beside the study, expected a CSV with the header {head}"
+        )
+    try:
+        record = read(path)
+        angles = {column.name: column.si() for column in record.columns.values() if column.name in _JOINTS}
+    except InputError as error:
+        raise StudyError(where, f"positions.file: {error} (its header should be {head})") from error
+    if tuple(sorted(angles)) != chain.joints:
+        raise StudyError(
+            where, f"{key}: found {', '.join(record.columns)}, expected {', '.join(chain.joints)}"
+        )
+    if len(rows := np.stack([angles[joint] for joint in chain.joints], axis=-1)) > MOST:
+        raise StudyError(where, f"{key}: found {len(rows)} positions, expected at most {MOST}")
+    missing = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if missing.size:
+        raise StudyError(where, f"{key}: found no angle in row {missing[0] + 1}, expected one for each axis")
+    return Plan(path.name, rows)

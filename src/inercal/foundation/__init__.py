@@ -1,0 +1,1 @@
+"""The shared floors: data, geometry, instruments, rigs, results, inference."""

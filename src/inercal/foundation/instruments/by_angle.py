@@ -1,0 +1,93 @@
+"""Instruments as a table sees them: the terms of each output channel, forward from truth to indication.
+
+gyrowheel, rotor gyro (813-style), axis X (Y alike), a the gravity reference in units of the site's gravity,
+``a = [0 0 -1] C_nb`` (an accelerometer reads -a), w the rate [rad/s], y in the unit of the record::
+
+    y = k_x w_x + k_y w_y + k_z w_z + DX_F + DX_X a_x + DX_Y a_y + DX_Z a_z
+        + DX_XX a_x^2 + DX_YY a_y^2 (+ DX_ZZ a_z^2) + DX_XY a_x a_y + DX_XZ a_x a_z + DX_YZ a_y a_z
+
+gyro (952-style), axis i, f the specific force [m/s^2]::
+
+    y = S (w_i + T_ij w_j + T_ik w_k) + D_F + G f (+ G_ixx f_x^2 + G_iyy f_y^2 + G_izz f_z^2
+        + G_ixy f_x f_y + G_ixz f_x f_z + G_iyz f_y f_z)
+
+accelerometer (1293-style), axis i, p and o the next ones in cyclic order::
+
+    y = K0 + K1 (f_i + M_ip f_p + M_io f_o + K2 f_i^2 + K3 f_i^3 + Koq f_i |f_i|
+                 + Kip f_i f_p + Kio f_i f_o + Kpo f_p f_o + Kpp f_p^2 + Koo f_o^2)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from inercal.foundation.instruments.polynomial import ChannelModel, Monomial, monomial
+
+#: kind of instrument -> its channels
+CHANNELS: Mapping[str, tuple[str, ...]] = {
+    "gyrowheel": ("y_x", "y_y"),
+    "gyro": ("gyro_x", "gyro_y", "gyro_z"),
+    "accelerometer": ("acc_x", "acc_y", "acc_z"),
+}
+
+#: terms that are there only where they are asked for: a plan on one table seldom tells them from others
+EXTRA = (
+    *("DX_ZZ", "DY_ZZ"),
+    *(f"{k}_{i}" for k in ("Koq", "Kpp", "Koo") for i in "xyz"),
+    *(f"G_{i}{jk}" for i in "xyz" for jk in ("xx", "yy", "zz", "xy", "xz", "yz")),
+)
+
+
+def channel_model(kind: str, channel: str) -> ChannelModel:
+    """All terms of a channel of an instrument of that kind; raises KeyError for a channel it has not."""
+    if channel not in CHANNELS[kind]:
+        raise KeyError(channel)
+    axis = channel[-1]
+    return {"gyrowheel": _drift, "gyro": _gyro, "accelerometer": _accelerometer}[kind](axis)
+
+
+def _made(
+    channel: str, terms: Mapping[str, Monomial], leading: str = "", relative: frozenset[str] = frozenset()
+) -> ChannelModel:
+    """A channel of these terms."""
+    return ChannelModel(channel, tuple(terms), tuple(terms.values()), leading, relative)
+
+
+def _drift(axis: str) -> ChannelModel:
+    """Axis ``x`` or ``y`` of a gyrowheel."""
+    k, D = {"x": ("k", "DX"), "y": ("kY", "DY")}[axis]
+    terms = {f"{k}_{i}": monomial(i.upper()) for i in "xyz"}
+    for letters in ("", "x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz"):
+        terms[f"{D}_{letters.upper() or 'F'}"] = monomial(letters)
+    return _made(f"y_{axis}", terms)
+
+
+def _gyro(axis: str) -> ChannelModel:
+    """Axis x, y or z of a gyro triad, or a single-axis gyro along it."""
+    others = [j for j in "xyz" if j != axis]
+    terms = {f"D_F_{axis}": monomial(""), f"S_{axis}": monomial(axis.upper())}
+    terms |= {f"T_{axis}{j}": monomial(j.upper()) for j in others}
+    terms |= {f"G_{axis}{j}": monomial(j) for j in ("x", "y", "z", "xx", "yy", "zz", "xy", "xz", "yz")}
+    return _made(f"gyro_{axis}", terms, f"S_{axis}", frozenset(f"T_{axis}{j}" for j in others))
+
+
+def _accelerometer(axis: str) -> ChannelModel:
+    """Axis x, y or z of an accelerometer triad, or a single accelerometer along it."""
+    i = axis
+    p, o = "yzx"["xyz".index(i)], "zxy"["xyz".index(i)]
+    terms = {
+        f"K0_{i}": monomial(""),
+        f"K1_{i}": monomial(i),
+        f"M_{i}{p}": monomial(p),
+        f"M_{i}{o}": monomial(o),
+        f"K2_{i}": monomial(i + i),
+        f"K3_{i}": monomial(i + i + i),
+        f"Koq_{i}": monomial(i, odd="xyz".index(i)),
+        f"Kip_{i}": monomial(i + p),
+        f"Kio_{i}": monomial(i + o),
+        f"Kpo_{i}": monomial(p + o),
+        f"Kpp_{i}": monomial(p + p),
+        f"Koo_{i}": monomial(o + o),
+    }
+    relative = frozenset(symbol for symbol in terms if not symbol.startswith(("K0", "K1")))
+    return _made(f"acc_{axis}", terms, f"K1_{i}", relative)

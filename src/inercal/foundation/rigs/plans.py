@@ -1,0 +1,88 @@
+"""Positions of a table as data: grids over the full circle, the named tumbles of the field, and lists."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from inercal.foundation.arrays import Array, short_repr
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Positions to be taken one after the other: ``angles`` (n, joints) [rad], and what they are called."""
+
+    name: str
+    angles: Array
+
+    def __len__(self) -> int:
+        """Number of positions."""
+        return len(self.angles)
+
+
+def grid(counts: Sequence[int], half_step: bool = True) -> Plan:
+    """All combinations of evenly spaced angles over the full circle, the first joint slowest.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        Number of angles of each joint.
+    half_step : bool
+        Start half a step from zero, else at zero. With multiples of four no axis then lies along gravity.
+    """
+    if any(count < 1 for count in counts):
+        raise ValueError(f"found counts {tuple(counts)}, expected 1 or more of each joint")
+    offset = 0.5 if half_step else 0.0
+    circles = [2.0 * np.pi * (np.arange(count) + offset) / count for count in counts]
+    angles = np.stack([axis.ravel() for axis in np.meshgrid(*circles, indexing="ij")], axis=-1)
+    return Plan(" x ".join(map(str, counts)) + " grid", angles)
+
+
+def listed(angles: ArrayLike) -> Plan:
+    """Positions as given, (n, joints) [rad]."""
+    return Plan("list", np.atleast_2d(np.asarray(angles, dtype=float)))
+
+
+_EIGHTHS = 45.0 * np.arange(8)
+_QUARTERS = 90.0 * np.arange(4)
+
+
+def _pairs(phi1: ArrayLike, phi2: ArrayLike) -> list[tuple[float, float]]:
+    """Pairs of two broadcast lists [deg]."""
+    first, second = np.broadcast_arrays(np.asarray(phi1, dtype=float), np.asarray(phi2, dtype=float))
+    return list(zip(first.ravel().tolist(), second.ravel().tolist(), strict=True))
+
+
+#: the named plans of a two-axis table (outer y, inner z), pairs of angles [deg]
+_NAMED: Mapping[str, list[tuple[float, float]]] = {
+    # gravity along each half axis of the instrument
+    "6-position": [(0, 0), (180, 0), (90, 0), (90, 90), (90, 180), (90, 270)],
+    # gravity towards the corners of a cube
+    "8-position": [
+        (float(np.degrees(tilt)), turn)
+        for tilt in (np.arccos(1.0 / np.sqrt(3.0)), np.arccos(-1.0 / np.sqrt(3.0)))
+        for turn in (45.0, 135.0, 225.0, 315.0)
+    ],
+    # gravity towards the middle of the edges of a cube
+    "12-position": [
+        *_pairs(45.0, _QUARTERS),
+        *_pairs(90.0, _QUARTERS + 45.0),
+        *_pairs(135.0, _QUARTERS),
+    ],
+    # the classic tumble: three circles of eight
+    "24-position": [*_pairs(_EIGHTHS, 0.0), *_pairs(_EIGHTHS, 90.0), *_pairs(90.0, _EIGHTHS)],
+    # all quarter turns of both axes
+    "16-cube": [(a, b) for a in _QUARTERS.tolist() for b in _QUARTERS.tolist()],
+}
+
+NAMED = tuple(_NAMED)
+"""Names of the plans of a two-axis table."""
+
+
+def named(name: str) -> Plan:
+    """A named plan of a two-axis table; raises KeyError for an unknown name."""
+    return Plan(name, np.radians(_NAMED[name]))

@@ -1,0 +1,143 @@
+"""Gross faults of a test on a table: units, signs, axes and clocks with which sensors and angles do not agree."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+from inercal.systems.imu.aided.blocks import Blocks, small_turn
+from inercal.systems.imu.aided.table import Motion
+from inercal.systems.imu.limits import LIMITS
+from inercal.systems.imu.settings import mountings
+
+_FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Agreement of an output with the table: ``scale`` [output per SI unit], and ``miss``, the rms it leaves over
+    the rms of the output's variation."""
+
+    scale: float
+    miss: float
+
+
+def agreement(y: Array, x: Array) -> Agreement:
+    """Fit ``y = scale x + bias``, one scale for the three axes of (n, 3)."""
+    dy, dx = y - y.mean(axis=0), x - x.mean(axis=0)
+    scale = float(np.sum(dx * dy) / max(float(np.sum(dx * dx)), 1e-300))
+    size = float(np.sum(dy * dy))
+    if scale <= 0.0 or size == 0.0:
+        return Agreement(scale, 1.0)
+    return Agreement(scale, float(np.sqrt(np.sum((dy - scale * dx) ** 2) / size)))
+
+
+def expected(blocks: Blocks, motion: Motion) -> Array:
+    """Specific force in units of gravity, or rate [rad/s], (n, 3) on the instrument's axes, roughly."""
+    if blocks.triad.sensor == "acc":
+        return motion.attitude(blocks.middle)[:, 2, :]
+    first, last = motion.attitude(blocks.nodes[:, 0]), motion.attitude(blocks.nodes[:, -1])
+    return np.asarray(small_turn(np.swapaxes(first, 1, 2) @ last) / blocks.length[:, None])
+
+
+def travel(motion: Motion) -> float:
+    """Largest angle [rad] between two attitudes about one axis of the table."""
+    return float(np.max(np.ptp(motion.angles, axis=0)))
+
+
+def tells(sensor: str, x: Array) -> bool:
+    """True where what the table says of a triad, as from `expected`, varies enough for its output to be compared."""
+    return bool(
+        np.max(np.ptp(x, axis=0)) > (LIMITS.least_force_change if sensor == "acc" else LIMITS.slowest_turn)
+    )
+
+
+def lag(blocks: Blocks, motion: Motion) -> float:
+    """Time [s] in whole blocks by which the angles come late, by when table and gyro turn; 0 unless clearly better."""
+    commanded = np.linalg.norm(expected(blocks, motion), axis=1)
+    seen = np.linalg.norm(blocks.y - np.median(blocks.y, axis=0), axis=1)
+    commanded, seen = commanded - commanded.mean(), seen - seen.mean()
+    size = np.linalg.norm(commanded) * np.linalg.norm(seen)
+    if size == 0.0:
+        return 0.0
+    both = np.correlate(commanded, seen, mode="full") / size
+    middle, length = len(seen) - 1, float(np.median(blocks.length))
+    reach = min(int(LIMITS.longest_lag / length), len(seen) // 2)
+    near = both[middle - reach : middle + reach + 1]
+    best = int(np.argmax(near)) - reach
+    return best * length if near[best + reach] > both[middle] + LIMITS.lag_correlation else 0.0
+
+
+def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
+    """Sentences that would make sense of outputs that do not follow the table."""
+    ranked = []
+    for words, other in _angles(motion):
+        misses = [agreement(each.y, expected(each, other)).miss for each in sides]
+        if max(misses) < LIMITS.agreement_miss:
+            ranked.append((sum(misses), words))
+    identity = ("+x", "+y", "+z")
+    inputs = [expected(each, motion) for each in sides]
+    for axes, turn in mountings().items():
+        misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, inputs, strict=True)]
+        if axes != identity and max(misses) < LIMITS.agreement_miss:
+            ranked.append((sum(misses), _mounted(motion, turn)))
+    if ranked:
+        yield from (words for _, words in sorted(ranked)[:3])
+        return
+    for each, x in zip(sides, inputs, strict=True):
+        yield from _channels(each, x)
+
+
+def _angles(motion: Motion) -> Iterator[tuple[str, Motion]]:
+    """Other readings of the angles, and what they say."""
+    joints = motion.chain.joints
+    for factor, size in _FACTORS:
+        for order in itertools.permutations(range(len(joints))):
+            for signs in itertools.product((1.0, -1.0), repeat=len(joints)):
+                texts = []
+                if size:
+                    texts.append(f"the angles are {size} (check whether they are in deg or rad)")
+                if order != tuple(range(len(joints))):
+                    texts.append(f"the columns {', '.join(joints)} are exchanged")
+                wrong = [name for name, sign in zip(joints, signs, strict=True) if sign < 0.0]
+                if wrong:
+                    texts.append(f"the sign of {' and '.join(wrong)} is reversed")
+                if texts and len(texts) < 3:
+                    angles = factor * motion.angles[:, order] * np.array(signs)
+                    yield " and ".join(texts), replace(motion, angles=angles)
+
+
+def _mounted(motion: Motion, turn: Array) -> str:
+    """The mounting that turns the nominal axes by a rotation, as the study would say it."""
+    from inercal.foundation.rigs.chain import Fixed
+
+    last = [each.rotation for each in motion.chain.elements if isinstance(each, Fixed)]
+    whole = (last[-1] if last else np.eye(3)) @ turn
+    axes = [
+        f"{'+' if column.sum() > 0 else '-'}{'xyz'[int(np.argmax(np.abs(column)))]}" for column in whole.T
+    ]
+    quoted = ", ".join(f'"{axis}"' for axis in axes)
+    return f"the instrument is mounted with imu.aided.mounting = [{quoted}]"
+
+
+def _channels(blocks: Blocks, x: Array) -> Iterator[str]:
+    """Other signs or another order of a triad's own axes."""
+    sensor = blocks.triad.sensor
+    if agreement(blocks.y, x).miss < LIMITS.agreement_miss:
+        return
+    miss, order, signs = min(
+        (agreement(blocks.y, x[:, order] * np.array(signs)).miss, order, signs)
+        for order in itertools.permutations(range(3))
+        for signs in itertools.product((1.0, -1.0), repeat=3)
+    )
+    if miss < LIMITS.agreement_miss:
+        measured = ", ".join(
+            f"{sensor}_{name} measures {'+' if sign > 0 else '-'}{'xyz'[axis]}"
+            for name, axis, sign in zip("xyz", order, signs, strict=True)
+            if axis != "xyz".index(name) or sign < 0
+        )
+        yield f"{measured} of the mounting that is stated"

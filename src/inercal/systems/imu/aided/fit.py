@@ -1,0 +1,209 @@
+"""The generalised least-squares fit of all sensors together, with the levels of noise that the data show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.identifiability import Identifiability, identify
+from inercal.systems.imu.aided.blocks import Reference, reference
+from inercal.systems.imu.aided.levels import Levels, chosen, levels
+from inercal.systems.imu.aided.model import Equation, Side, Unknowns, equations
+from inercal.systems.imu.aided.table import Motion
+from inercal.systems.imu.aided.walk import Whitened, whiten
+
+STEPS = 12
+"""Gauss-Newton steps at most, with first and with last levels of noise; two to four do."""
+
+DONE = 1e-3
+"""A step that is smaller than this part of every standard uncertainty ends the iteration."""
+
+LEAST = 1e-8
+"""A step that is smaller than this part of the unknowns' typical sizes ends it too."""
+
+SAME = 1e-8
+"""Change of a time shift [s] for which the reference is not computed anew."""
+
+SMALL = 0.1
+"""Part of its noise that a combination of unknowns has to move a sensor's output by to count for the noise levels."""
+
+FIRST_WALK = 0.02
+"""Wander of a bias [1/s] over its white noise, before the data have told it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """One sensor in the fit: its whitened equations, noise, and residuals (n,) of its blocks less its mean bias."""
+
+    side: Side
+    equation: Equation
+    noise: Levels
+    whitened: Whitened
+
+    @property
+    def bias(self) -> float:
+        """Mean of its bias over the test [output]."""
+        return float(self.whitened.mean[-1])
+
+    @property
+    def residual(self) -> Array:
+        """Residuals (n,) [output]."""
+        return np.asarray(self.equation.residual - self.bias)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
+
+    ``references`` by triad; ``identified`` by triad the identifiability of its gains on a perfect table.
+    """
+
+    unknowns: Unknowns
+    x: Array
+    covariance: Array
+    sensors: Sequence[Sensor]
+    references: Mapping[str, Reference]
+    identified: Mapping[str, Identifiability]
+    converged: bool
+
+
+def fit(
+    sides: Sequence[Side],
+    motion: Motion,
+    layout: Unknowns,
+    gravity: float,
+    names: Mapping[str, tuple[str, ...]],
+) -> Fit:
+    """Fit all sensors.
+
+    Parameters
+    ----------
+    sides : sequence of Side
+        The triads.
+    motion : Motion
+    layout : Unknowns
+    gravity : float
+        Of the site [m/s^2].
+    names : mapping
+        By triad, of its gains (9,) row by row, and of the g-sensitivities where they are estimated.
+    """
+    x = layout.mean.copy()
+    late = {side.sensor: layout.places[f"time shift of {side.sensor}"][0] for side in sides}
+    references = {side.sensor: reference(side.blocks, motion, 0.0) for side in sides}
+    converged = False
+    for rough in (True, False):
+        noise: list[Levels] = []
+        for _ in range(STEPS):
+            pairs = [
+                (side, each)
+                for side in sides
+                for each in equations(side, references[side.sensor], layout, x, gravity)
+            ]
+            noise = noise or [
+                level
+                for first in range(0, len(pairs), 3)
+                for level in chosen(
+                    [noise_of(side, each, layout, x, rough) for side, each in pairs[first : first + 3]]
+                )
+            ]
+            sensors = [
+                Sensor(side, each, level, _whiten(side, each, level))
+                for (side, each), level in zip(pairs, noise, strict=True)
+            ]
+            R, right = _stacked(sensors, layout, layout.mean - x)
+            inverse = np.linalg.inv(R)
+            dx = layout.sd * (inverse @ right)
+            done = DONE * np.linalg.norm(inverse, axis=1) + LEAST
+            converged = bool(np.all(np.abs(dx) <= layout.sd * done))
+            if converged:
+                break
+            x = x + dx
+            for side in sides:
+                shift = float(x[late[side.sensor]])
+                if abs(shift - references[side.sensor].shift) > SAME:
+                    references[side.sensor] = reference(side.blocks, motion, shift)
+    root = layout.sd[:, None] * inverse
+    identified = {side.sensor: _identified(sensors, layout, side.sensor, names) for side in sides}
+    return Fit(layout, x, root @ root.T, sensors, references, identified, converged)
+
+
+def noise_of(
+    side: Side, equation: Equation, layout: Unknowns, x: Array, rough: bool = False
+) -> tuple[Levels, Levels]:
+    """Noise of a sensor; ``rough`` from its steps at rest alone, while the fit is far off."""
+    blocks = side.blocks
+    sd = layout.sd[equation.index]
+    y = equation.residual
+    floor = 1e-12 * max(float(np.max(np.abs(blocks.y))), 1e-290)
+    if rough:
+        both = blocks.resting[1:] & blocks.resting[:-1]
+        steps = np.diff(y)[both] if np.count_nonzero(both) >= 10 else np.diff(y)
+        n = float(np.sqrt(max(0.5 * np.median(steps**2) / 0.455, floor**2) * np.median(blocks.length)))
+        level = Levels(n, n, FIRST_WALK * n, FIRST_WALK * n, np.inf, np.inf, 0.0)
+        return level, level
+    U, s, Vt = np.linalg.svd(equation.columns * sd, full_matrices=False)
+    some = s > SMALL * np.std(np.diff(y))
+    prior = Vt[some] @ ((layout.mean - x)[equation.index] / sd)
+    return levels(y, U[:, some] * s[some], prior, blocks.middle, blocks.length, blocks.resting, floor)
+
+
+def _whiten(side: Side, equation: Equation, level: Levels) -> Whitened:
+    """Whitened columns of a sensor, the residual last."""
+    blocks = side.blocks
+    columns = np.column_stack([equation.columns, equation.residual])
+    t, length, resting = blocks.middle, blocks.length, blocks.resting
+    return whiten(columns, t, level.white(length, resting), level.wander(t, length, resting))
+
+
+def _stacked(sensors: Sequence[Sensor], layout: Unknowns, from_mean: Array) -> tuple[Array, Array]:
+    """Triangular factor (P, P) of all equations and priors, in units of the prior's sd, and its right-hand side."""
+    P = len(layout.sd)
+    rows = [np.column_stack([np.eye(P), from_mean / layout.sd])]
+    for sensor in sensors:
+        small = _triangle(sensor.whitened.rows[1:])
+        wide = np.zeros((len(small), P + 1))
+        index = sensor.equation.index
+        wide[:, index] = small[:, :-1] * layout.sd[index]
+        wide[:, -1] = small[:, -1]
+        rows.append(wide)
+    R = _triangle(np.vstack(rows))
+    return R[:P, :P], R[:P, -1]
+
+
+def _identified(
+    sensors: Sequence[Sensor], layout: Unknowns, triad: str, names: Mapping[str, tuple[str, ...]]
+) -> Identifiability:
+    """Identifiability of the gains of a triad, the other unknowns free within their priors.
+
+    Errors of the table do not count: a large one, such as that of the mounting, which turns the frame of all sensors,
+    makes the uncertainties large, but no motion would help.
+    """
+    main = np.concatenate([layout.places[f"gain {each}"] for each in _gains(triad, layout)])
+    of_table = [layout.places[name] for name in layout.stated if name != "earth rate"]
+    others = np.setdiff1d(np.arange(len(layout.sd)), np.concatenate([main, *of_table]))
+    rows = [np.zeros((len(others), len(layout.sd)))]
+    rows[0][range(len(others)), others] = 1.0
+    for sensor in sensors:
+        if sensor.side.sensor != triad:
+            continue
+        index = sensor.equation.index
+        wide = np.zeros((len(sensor.whitened.rows) - 1, len(layout.sd)))
+        wide[:, index] = sensor.whitened.rows[1:, :-1] * layout.sd[index]
+        rows.append(_triangle(wide))
+    R = _triangle(np.vstack(rows)[:, np.r_[others, main]])
+    own = R[len(others) :, len(others) :]
+    return identify(own, names[triad], np.ones(len(main)))
+
+
+def _gains(triad: str, layout: Unknowns) -> tuple[str, ...]:
+    """Groups of gains of a triad."""
+    more = "K2" if triad == "acc" else "G"
+    return (triad, more) if f"gain {more}" in layout.places else (triad,)
+
+
+def _triangle(rows: Array) -> Array:
+    """Triangular factor (q, p) of rows (n, p), the same in all that least squares asks."""
+    return np.asarray(np.linalg.qr(rows, mode="r"))

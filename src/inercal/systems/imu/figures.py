@@ -1,0 +1,59 @@
+"""Pictures and the page of an IMU's calibration, by whichever method it was made."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from inercal.faces.report.html import Picture, render
+from inercal.systems.imu.aided.calibration import AidedCalibration
+from inercal.systems.imu.aided.figures import pictures as of_aided
+from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
+from inercal.systems.imu.ferraris.figures import pictures as of_ferraris
+from inercal.systems.imu.known_rates.calibration import KnownRatesCalibration
+from inercal.systems.imu.known_rates.figures import pictures as of_known_rates
+from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
+from inercal.systems.imu.known_turns.figures import pictures as of_known_turns
+from inercal.systems.imu.means.calibration import MeansCalibration
+from inercal.systems.imu.means.figures import pictures as of_means
+from inercal.systems.imu.multiposition.figures import pictures as of_multiposition
+
+if TYPE_CHECKING:
+    from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
+
+    AnyCalibration: TypeAlias = (
+        MultipositionCalibration
+        | FerrarisCalibration
+        | AidedCalibration
+        | MeansCalibration
+        | KnownRatesCalibration
+        | KnownTurnsCalibration
+    )
+
+
+def main(calibration: AnyCalibration) -> Picture:
+    """The picture that answers the question: the poses, the sections or the test, and what the fit leaves over."""
+    return pictures(calibration)[0]
+
+
+def pictures(calibration: AnyCalibration) -> list[Picture]:
+    """All pictures of a calibration of any status, the main one first."""
+    match calibration:
+        case FerrarisCalibration():
+            return of_ferraris(calibration)
+        case AidedCalibration():
+            return of_aided(calibration)
+        case MeansCalibration():
+            return of_means(calibration)
+        case KnownRatesCalibration():
+            return of_known_rates(calibration)
+        case KnownTurnsCalibration():
+            return of_known_turns(calibration)
+        case _:
+            return of_multiposition(calibration)
+
+
+def page(calibration: AnyCalibration) -> str:
+    """The report of a calibration as one self-contained HTML page."""
+    return render(
+        calibration.estimate.shown(), pictures(calibration), "Calibration of an inertial measurement unit"
+    )

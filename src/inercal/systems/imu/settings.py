@@ -1,0 +1,256 @@
+"""Settings of a calibration of an IMU, and those of its methods, in SI."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.geometry.site import Site
+from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, within
+from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.units import Quantity
+
+MASKED = ("saturation",)
+"""Codes of a recording's findings whose samples no fit uses: turns in which a sensor saturates are left out."""
+
+COMMAND = "calibrate imu"
+"""The command behind every method of this room, as its results have it."""
+
+NOT_NEGATIVE = within(0.0, math.inf, "a size of 0 or more")
+
+TURN = Bounds(
+    lambda angle: math.radians(10.0) <= abs(angle) <= math.radians(36000.0),
+    "an angle of 10 deg to 36000 deg, negative for turns against the right-hand rule",
+)
+"""Angles of a turn."""
+
+TILT = within(0.0, math.radians(20.0), "a standard uncertainty up to 20 deg")
+"""Standard uncertainties of a direction."""
+
+
+@dataclass(frozen=True)
+class FerrarisSettings:
+    """Options of the Ferraris calibration: six positions, each axis up and down, and a turn about each axis.
+
+    Attributes
+    ----------
+    turn, alignment
+        As their keys say [rad]; independent from turn to turn, and from position to position in either of the two
+        directions across it.
+    turn_u : float
+        Standard uncertainty of ``turn`` [rad].
+    sections : mapping
+        Places of the sections by name: (start, end) in seconds of the record's time axis as floats, or in samples
+        (from 0, the end not included) as integers, or the label of its rows. Empty: from the labels of the record
+        that are names of sections, or detected.
+    """
+
+    turn: float = quantity(
+        "angle of the turns, positive about the positive axis by the right-hand rule, perhaps with its standard "
+        "uncertainty", "angle", "360 deg", example="360(0.5) deg", bounds=TURN, u="turn_u",
+    )  # fmt: skip
+    turn_u: float = 0.0
+    alignment: float | None = quantity(
+        "standard uncertainty of the direction of each position and of the axis of each turn; from the scatter of the "
+        "positions if absent", "angle", example="0.5 deg",
+        bounds=TILT,
+    )  # fmt: skip
+    sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class AidedSettings:
+    """Options of a reference-aided calibration, in SI.
+
+    Attributes
+    ----------
+    chain : Chain
+        The table from n (north, west, up) to the nominal axes of the instrument, with its errors; its joints are
+        columns of the record. Errors of scope ``sample`` are left to the scatter of the data.
+    azimuth_u : float or None
+        Standard uncertainty [rad] of the azimuth in the chain's base; None: the azimuth is not known.
+    """
+
+    chain: Chain = field()
+    azimuth_u: float | None = None
+
+
+@dataclass(frozen=True)
+class MeansSettings:
+    """Options of a calibration by pose means, a row for each pose: there are none."""
+
+
+@dataclass(frozen=True)
+class KnownRatesSettings:
+    """Options of a gyro's calibration at known rates: ``rates`` (k,) [rad/s], one a record, and their ``rates_u``."""
+
+    rates: tuple[float, ...]
+    rates_u: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class KnownTurnsSettings:
+    """Options of a gyro's calibration by turns by known angles, about x, y and z.
+
+    Attributes
+    ----------
+    angles, angles_u : three floats
+        Angle of each turn [rad], positive about the positive axis by the right-hand rule, and its standard uncertainty.
+    alignment : float or None
+        As its key says [rad].
+    """
+
+    angles: tuple[float, float, float]
+    angles_u: tuple[float, float, float]
+    alignment: float | None = None
+
+
+Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRatesSettings | KnownTurnsSettings
+"""Options of a method other than multi-position."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table.
+
+    Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
+    """
+
+    poses: int = option("of multiposition: held one after the other, the first level", 24, least=4, most=1000)
+    start: float = quantity("length of the first hold, or rest of the table", "time", "30 s", bounds=TIME)
+    hold: float = quantity("length of each other hold, position or rest", "time", "3 s", bounds=TIME)
+    turning: float = quantity("length of each turn; of the table, by 90 deg", "time", "3 s", bounds=TIME)
+    sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
+    accelerometer_noise: float = quantity(
+        "white noise of the accelerometers", "velocity random walk", "80 ug/sqrt(Hz)", bounds=NOT_NEGATIVE
+    )
+    gyro_noise: float = quantity(
+        "white noise of the gyros", "angle random walk", "2 deg/sqrt(h)", bounds=NOT_NEGATIVE
+    )
+    accelerometer_wander: float = quantity(
+        "standard deviation of the biases of accelerometers", "acceleration", "30 ug", bounds=NOT_NEGATIVE
+    )
+    gyro_wander: float = quantity(
+        "standard deviation of the biases of gyros", "rate", "10 deg/h", bounds=NOT_NEGATIVE
+    )
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Disturbances that a simulation adds to a recording; none if absent. ``k2`` [1/(m/s^2)]."""
+
+    restless_start: float = quantity(
+        "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
+        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE,
+    )  # fmt: skip
+    knocks: int = option("turns in which the instrument is knocked", 0, least=0, most=1000)
+    knock: float = quantity("angle by which the gyro is wrong after a knock", "angle", "1 deg")
+    gyro_range: float | None = quantity(
+        "rate at which the gyro clips; without limit if absent", "rate", example="80 deg/s", bounds=RATE
+    )
+    clock: float = quantity(
+        "relative error of the clock, positive where it counts too many seconds", "number", "0", example="0.3 %",
+        bounds=within(-0.5, 0.5, "within 50 %"),
+    )  # fmt: skip
+    lever_arm: float = quantity(
+        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes", "length",
+        "0 mm", example="50 mm", bounds=NOT_NEGATIVE,
+    )  # fmt: skip
+    delay: float = quantity(
+        "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms"
+    )
+    k2: float = 0.0
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """Parts of a recording that no fit uses: ``times`` (begin, end) [s] of its clock, and ``poses`` by number."""
+
+    times: tuple[tuple[float, float], ...] = ()
+    poses: tuple[int, ...] = ()
+
+    def touches(self, begin: float, end: float) -> bool:
+        """True where some of the time from ``begin`` to ``end`` [s] is left out."""
+        return any(begin < last and first < end for first, last in self.times)
+
+
+@short_repr
+@dataclass(frozen=True)
+class ImuSettings:
+    """Settings of a calibration, in SI.
+
+    Attributes
+    ----------
+    site : Site
+        Local gravity and what it is uncertain by.
+    static_start, g_sensitivity, bias_drift, time_base_u
+        As their keys say.
+    k2 : bool
+        Second-order coefficients of the accelerometers are estimated.
+    k2_u : float or None
+        Their standard deviation about 0 [1/(m/s^2)] where they are not; as usual for such sensors if absent.
+    exclude : Exclusion
+        Poses and turns to be left out.
+    traceability : mapping
+        ``instrument``, ``operator``, ``date``, ``reference``; empty texts where not given.
+    method : Method or None
+        Options of the method; None: multi-position, un-aided.
+    simulation, disturbances
+        What is simulated, and what is added to it.
+    temperature : Quantity or None
+        Temperature of the instrument.
+    given : mapping
+        The keys of the study that were given, and their values as typed; ready for JSON.
+    """
+
+    site: Site
+    static_start: float | None = quantity(
+        "length of the still period at the start; found automatically if absent", "time", example="50 s",
+        bounds=TIME,
+    )  # fmt: skip
+    g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
+    bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
+    k2: bool = False
+    k2_u: float | None = None
+    time_base_u: float = quantity(
+        "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
+        bounds=RELATIVE_U, name="time_base",
+    )  # fmt: skip
+    exclude: Exclusion = Exclusion()
+    traceability: Mapping[str, str] = field(default_factory=dict)
+    method: Method | None = None
+    simulation: Simulation = Simulation()
+    disturbances: Disturbances = Disturbances()
+    temperature: Quantity | None = None
+    given: Mapping[str, Any] = field(default_factory=dict)
+
+
+def mounting_of(axes: tuple[str, str, str]) -> Array | None:
+    """Rotation (3, 3) whose columns are the instrument's x, y, z in the frame of the inner axis.
+
+    Parameters
+    ----------
+    axes : three of ``+x -x +y -y +z -z``
+        The axis of the table, at zero angles, along which each axis of the instrument points.
+
+    Returns
+    -------
+    (3, 3), or None where the three make no right-handed frame
+    """
+    columns = [float(f"{axis[0]}1") * np.eye(3)["xyz".index(axis[1])] for axis in axes]
+    rotation = np.stack(columns, axis=1)
+    return rotation if np.linalg.det(rotation) > 0.5 else None
+
+
+def mountings() -> dict[tuple[str, ...], Array]:
+    """The 24 ways to mount an instrument square on a table, as rotations by axes."""
+    axes = [f"{sign}{axis}" for axis in "xyz" for sign in "+-"]
+    made = {each: mounting_of((each[0], each[1], each[2])) for each in itertools.permutations(axes, 3)}
+    return {each: rotation for each, rotation in made.items() if rotation is not None}

@@ -1,0 +1,178 @@
+"""The noise that sensors show in the innovations of the error-state filter, beside the stated one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.consistency import slow_power, whiteness
+from inercal.foundation.estimate.hypotheses import sigmas
+from inercal.foundation.findings import EVERYTHING, Finding, with_alternatives
+from inercal.foundation.records.places import places
+from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
+from inercal.systems.selfcal.diagnosis.needed_states import Explained, needed_states
+from inercal.systems.selfcal.filters.filter_result import FilterResult
+from inercal.systems.selfcal.limits import LIMITS
+
+_SENSORS = ("accelerometers", "encoders")
+
+_NOISE = "state the noise as it is under [noise]"
+
+
+def misstated(case: Case, now: FilterResult) -> list[Finding]:
+    """Innovations larger or smaller than the stated noise has them, or correlated in time."""
+    if not now.converged:
+        text = f"the error-state filter fails on this recording: {now.message}"
+        return [Finding("contradiction", text, harm=EVERYTHING)]
+    z = regular(case[0], now)
+    findings, wide = [], False
+    for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        finite = columns[np.isfinite(columns)]
+        if len(finite) < LIMITS.scatter_scalars:
+            continue
+        mean, error = float(np.mean(np.square(finite))), math.sqrt(2.0 / len(finite))
+        factor = math.sqrt(mean)
+        if mean > 1.0 + LIMITS.nis_sigmas * error:
+            wide = True
+            if _even(columns, mean) and whiteness(columns) > LIMITS.risk:
+                text = f"{sensor}: noise is {factor:.3g} times what is stated, evenly over the recording"
+                findings.append(Finding("excess_scatter", text, harm=EVERYTHING, action=_NOISE))
+        elif mean < 1.0 - LIMITS.nis_sigmas * error and factor * LIMITS.low_noise_ratio < 1.0:
+            text = f"{sensor}: noise is only {factor:.2g} of what is stated, and u is too large"
+            findings.append(Finding("low_scatter", text, action=_NOISE))
+    if findings:
+        return findings
+    if not wide and case[1].noise.unsteady:
+        return []  # readings on a base that sways, or vibrates, are not independent
+    if not wide and whiteness(z) > LIMITS.risk:
+        return _wandering(case, z)
+    if (swaying := _swaying(case, z)) is not None:
+        return [swaying]
+    return [unsteady(case) or _unexplained(z)]
+
+
+def unsteady(case: Case, any_states: bool = True) -> Finding | None:
+    """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
+    other as possible too. States alone count with ``any_states`` only."""
+    noise, states = _restless_gyros(case), needed_states(case)
+    found = [each for each in (noise, states if noise or any_states else None) if each]
+    if not found:
+        return None
+    best, *others = sorted(found, key=lambda each: -each.white)
+    return with_alternatives(
+        best.finding, (each.finding.headline for each in others if each.white > LIMITS.risk)
+    )
+
+
+def _wandering(case: Case, z: Array) -> list[Finding]:
+    """Biases of accelerometers that wander and are no states, which slow power shows where nothing else does."""
+    recording, problem = case
+    rows = LIMITS.slow_time / float(np.median(recording.dt))
+    if problem.states.has("accelerometer_walk") or slow_power(z[:, :3], rows) > LIMITS.risk:
+        return []
+    text = "innovations of the accelerometers are correlated over seconds, as where their biases wander"
+    action = "name bias_walk in states under [model]"
+    return [Finding("unmodelled", text, harm=EVERYTHING, action=action)]
+
+
+def _swaying(case: Case, z: Array) -> Finding | None:
+    """One frequency in the innovations of the encoders, if any: Fisher's test of the largest ordinate of a periodogram
+    (R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society A 125 (1929) 54)."""
+    recording, problem = case
+    n, dt = len(z), float(np.median(recording.dt))
+    power = np.square(np.abs(np.fft.rfft(np.nan_to_num(z[:, 3:]), axis=0))).sum(axis=1)[1 : (n + 1) // 2]
+    if n < LIMITS.scatter_scalars or not power.any():
+        return None
+    largest = int(np.argmax(power))
+    rest = math.log1p(-min(float(power[largest] / power.sum()), 1.0 - 1e-9))
+    # sums over three joints are more even than one
+    if math.log(len(power)) + (len(power) - 1) * rest > math.log(LIMITS.risk):
+        return None
+    # turning joints spread it; two level axes sway alike
+    wide = len(power) // LIMITS.sway_bands
+    band = power[max(largest - wide, 0) : largest + wide + 1]
+    amplitude = math.sqrt(2.0 * float(band.sum())) / n * problem.noise.encoder
+    stated = replace(problem.noise, base_sway=amplitude, vibration=0.0).of_readings
+    if not sound(filtered((recording, replace(problem, noise=stated)))):
+        return None
+    hertz, seconds = (largest + 1) / (n * dt), math.degrees(amplitude) * 3600.0
+    text = f"the encoders' readings swing with {hertz:.2g} Hz, by some {seconds:.2g} arcsec"
+    action = "where the base sways, state base_sway under [noise]"
+    return Finding("excess_scatter", text, harm=EVERYTHING, action=action)
+
+
+def _even(columns: Array, mean: float) -> bool:
+    """True where the mean square is the same over all parts of the recording."""
+    limit = sigmas(LIMITS.risk, LIMITS.even_parts)
+    for part in np.array_split(columns, LIMITS.even_parts):
+        finite = part[np.isfinite(part)]
+        off = abs(np.mean(np.square(finite)) / mean - 1.0) if len(finite) else 0.0
+        if off > limit * math.sqrt(2.0 / max(len(finite), 1)):
+            return False
+    return True
+
+
+@once
+def _restless_gyros(case: Case) -> Explained | None:
+    """Gyro noise other than stated that explains the innovations, if any."""
+    case = short(case)
+    for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
+        fitting = dict[float, float]()
+        for factor in 2.0**octaves:
+            if (left := _left_by_walk(case, factor)) > LIMITS.risk:
+                fitting[float(factor)] = left
+            elif fitting:
+                break
+        if fitting:
+            low, high = min(fitting), max(fitting)
+            text = f"the gyros' angle random walk looks about {_two_digits(math.sqrt(low * high))} times what is stated"
+            more = f" ({_two_digits(low)} to {_two_digits(high)})" if len(fitting) > 1 else ""
+            larger = octaves[0] > 0.0
+            code, harm = ("excess_scatter", EVERYTHING) if larger else ("low_scatter", ())
+            found = Finding(code, text + more, harm=harm, action="state angle_random_walk so under [noise]")
+            return Explained(found, max(fitting.values()))
+    return None
+
+
+def _two_digits(factor: float) -> str:
+    """A number to two digits, without an exponent."""
+    return f"{float(f'{factor:.2g}'):g}"
+
+
+def _left_by_walk(case: Case, factor: float) -> float:
+    """Whiteness of innovations (`Explained`) with a walk of the gyros larger by a factor; 0 if it explains none."""
+    recording, problem = case
+    noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
+    now = filtered((recording, replace(problem, noise=noise)))
+    # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
+    if not sound(now) or not float(np.nanmean(np.square(now.innovations[:, 3:]))) > LIMITS.walk_square:
+        return 0.0
+    return whiteness(regular(recording, now))
+
+
+def _unexplained(z: Array) -> Finding:
+    """Innovations that no known fault explains, with the part of the recording where they are largest."""
+    parts = np.array_split(np.arange(len(z)), 20)
+    squares = np.square(z)
+    size = [float(np.nanmean(squares[part])) if np.isfinite(squares[part]).any() else 0.0 for part in parts]
+    worst = parts[int(np.argmax(size))]
+    text = (
+        f"innovations contradict the model (mean square {max(size):.3g} at most, expected 1{_correlated(z)})"
+    )
+    text += ", and no fault that is looked for explains them"
+    return Finding("contradiction", text, places("row", worst + 2), EVERYTHING)
+
+
+def _correlated(z: Array) -> str:
+    """Correlation from one row to the next of the sensors that have it, in words."""
+    words = ""
+    for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
+        products = columns[1:] * columns[:-1]
+        count = int(np.isfinite(products).sum())
+        share = float(np.nanmean(products) / np.nanmean(np.square(columns))) if count else 0.0
+        if abs(share) > LIMITS.nis_sigmas / math.sqrt(max(count, 1)):
+            words += f"; {sensor}: correlated from row to row, by {share:.2g}"
+    return words or ", or correlated in time"

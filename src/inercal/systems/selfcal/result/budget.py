@@ -1,0 +1,137 @@
+"""Uncertainty budget of the coefficients: noise, prior, and the systematic inputs of site and base.
+
+The covariance of a filter is split as that of the bounds along its path is; systematic inputs (type B) act through the
+error-state filter, run again with each changed by one standard uncertainty either way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.budget import TypeA, TypeB
+from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.units import parse_quantity, parse_unit
+from inercal.systems.selfcal.before.bounds import PathBounds
+from inercal.systems.selfcal.before.considered import sensitivities
+from inercal.systems.selfcal.filters.averaged import averaged
+from inercal.systems.selfcal.filters.filter_result import FilterResult
+from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
+from inercal.systems.selfcal.platform.recording import Recording
+from inercal.systems.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF, WALK, WAVE
+from inercal.systems.selfcal.result.systematic import systematic_inputs
+from inercal.systems.selfcal.settings import Noise, SelfcalSettings
+
+
+def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
+    """Noise and prior, whose covariances add up to that of the filter (p, p), product form.
+
+    Bounds and filter differ by little; ``T`` with ``T P_bounds T^T = P_filter`` takes the parts of one to the other.
+    """
+    prior = bounds.prior
+    roots = [np.linalg.cholesky(P / np.outer(prior, prior)) for P in (covariance, bounds.covariance)]
+    to_filter = prior[:, None] * np.linalg.solve(roots[1].T, roots[0].T).T / prior
+    levels = {
+        "angle random walk": ("angle random walk", noise.angle_random_walk, "rad/sqrt(s)"),
+        "accelerometer": ("accelerometer noise", noise.accelerometer, "m/s^2"),
+        "encoder": ("encoder noise", noise.encoder, "rad"),
+    }
+    sources: list[TypeA | TypeB] = []
+    for source, part in bounds.contributions.items():
+        P = to_filter @ part @ to_filter.T
+        P = 0.5 * (P + P.T)  # where hardly anything is known, rounding is not the same on both sides
+        if source in levels:
+            sources.append(TypeA(*levels[source], P, dof))
+        else:
+            # u in units of the prior standard deviations
+            values, vectors = np.linalg.eigh(P / np.outer(prior, prior))
+            root = prior[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+            sources.append(TypeB(source, 1.0, "1", root))
+    return sources
+
+
+def considered(
+    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
+) -> tuple[list[TypeB], Mapping[str, str]]:
+    """Errors of the rig that are no states: those stated with an uncertainty; and of each other kind the error, in
+    words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
+    assert filtered.history is not None
+    of = problem(settings)
+    known = {*of.names, *settings.model.left_out}
+    named = ALL[18 : WAVE + 2 * len(of.states.harmonics)]
+    left = [name for name in named if name not in known and KIND_OF[name] != "beta"]
+    along = filtered.history.attitude, filtered.coefficients
+    by_linear = sensitivities(recording, of, *along, left, restarts=filtered.restarts)
+    slopes = product_slope(filtered.coefficients) @ by_linear
+    sources, exact = list[TypeB](), dict[str, tuple[float, str]]()
+    for name, slope in zip(left, slopes.T, strict=True):
+        stated_u = settings.model.stated.get(name, (0.0, 0.0))[1]
+        if stated_u > 0.0:
+            sources.append(TypeB(name, stated_u, UNIT_OF[name], slope))
+            continue
+        worst, kind = int(np.argmax(np.abs(slope) / u)), KIND_OF[name]
+        usual = parse_quantity(STATES[kind].prior, STATES[kind].dimension, kind).value
+        shift = abs(slope[worst]) * usual / u[worst]
+        if shift > exact.get(kind, (1.0, ""))[0]:
+            unit, size = shown_unit(UNIT_OF[name])
+            exact[kind] = shift, f"{usual / shift / size:.2g} {unit} of {name} ({of.names[worst]})"
+    if not known & {*ALL[WALK:]}:
+        exact |= _wandering(settings.noise, float(np.ptp(recording.t)), dict(zip(of.names, u, strict=True)))
+    return sources, {kind: text for kind, (_, text) in exact.items()}
+
+
+def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, tuple[float, str]]:
+    """Biases that wander about their means, of which a recording that ``lasts`` [s] has another mean: the variance of
+    the mean of an exponentially correlated process (A. Gelb, Applied Optimal Estimation, 1974, section 3.8)."""
+    x = lasts / LIMITS.walk_time
+    of_mean = math.sqrt(LIMITS.walk_time * (0.5 - x / 6.0 if x < 1e-3 else (1.0 + math.expm1(-x) / x) / x))
+    walks = {"kg0": ("gyro_walk", noise.gyro_walk), "ka0": ("accelerometer_walk", noise.accelerometer_walk)}
+    found = []
+    for bias, (key, usual) in walks.items():
+        name = min((f"{bias}_{i}" for i in "xyz"), key=lambda each: u[each])
+        unit, size = shown_unit(UNIT_OF[name])
+        least = u[name] / of_mean
+        found.append((usual / least, f"{least / size:.2g} {unit}/sqrt(s) of {key} ({name})"))
+    if max(found)[0] <= 1.0:
+        return {}
+    # whichever of both: where one may matter, nobody knows that the other is as usual
+    return {"bias_walk": (max(found)[0], ", ".join(text for _, text in sorted(found, reverse=True)))}
+
+
+def systematic(
+    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
+) -> tuple[list[TypeB], Mapping[str, str]]:
+    """Inputs of site and base stated with an uncertainty; and for each that is stated without one the error of it, in
+    words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
+    sources, exact = list[TypeB](), dict[str, str]()
+    of = problem(settings)
+    fewer, judged = averaged(recording, of, filtered)
+    for each in systematic_inputs(settings):
+        if each.of_rig:
+            continue
+        by = each.u or each.step
+        moved = (replace(problem(each.changed(change)), noise=judged.noise) for change in (-by, by))
+        ends = [estimate(fewer, there, "error-state", history=False).coefficients for there in moved]
+        slope = (to_product(ends[1]) - to_product(ends[0])) / (2.0 * by)
+        worst = int(np.argmax(np.abs(slope) / u))
+        if each.name == "gravity" and each.u:
+            sources += [
+                TypeB(part.source, part.u, part.unit, part.sensitivity * slope)
+                for part in settings.site.inputs
+                if part.source != "latitude"
+            ]
+        elif each.u:
+            sources.append(TypeB(each.name, each.u, "rad", slope))
+        elif not np.isfinite(slope).all():
+            exact[each.name] = f"an unknown error of {each.name}, as the filter does not follow it"
+        elif slope[worst] != 0.0:
+            error = u[worst] / abs(slope[worst]) / parse_unit(each.unit).factor
+            exact[each.name] = f"{error:.2g} {each.unit} of {each.name} ({of.names[worst]})"
+    return sources, exact

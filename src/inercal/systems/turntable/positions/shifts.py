@@ -1,0 +1,155 @@
+"""Shift of the values by faults of a test: findings, and their part of the budget."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+from inercal.foundation.estimate.budget import TypeB
+from inercal.foundation.findings import Finding
+from inercal.foundation.records.places import counted
+from inercal.foundation.units import Unit
+from inercal.systems.turntable.limits import LIMITS
+from inercal.systems.turntable.positions.examination import Examination, Seen, Tested
+from inercal.systems.turntable.regression import Regression
+
+_SHOWN = 4
+"""Coefficients and faults named at most in a sentence."""
+
+_ROUNDING = 1e-9
+"""Part of what a fault does to the values below which a direction of it does nothing."""
+
+_DRIFTS = frozenset({"trend", "warm-up", "scale drift", "reading"})
+"""Kinds of faults that are others in each run."""
+
+_REMEDY: Mapping[str, str] = {
+    "trend": "let it settle, state bias_drift, or take the positions in an order without one",
+    "warm_up": 'wait until it is warm, or state bias_drift = "exponential"',
+    "heading_suspect": "check the azimuth, and state it as [rig.base] azimuth with dbase_z for its uncertainty",
+    "level_suspect": "level the base, or state dbase_x and dbase_y",
+    "angle_harmonic": "check the encoder, or state a larger error of this joint",
+    "approach_hysteresis": "reach all positions from the same side",
+    "outlier": "look for an angle that was mistyped, rows exchanged or a knock, and take this position out or again",
+    "ground_field": "look for magnets and iron, or shield the instrument",
+}
+"""Remedy for a finding of each code."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Values of a result: ``names`` (p,), ``slope`` (p, p) of them by the linear coefficients, ``u`` (p,)."""
+
+    names: tuple[str, ...]
+    slope: Array
+    u: Array
+
+    def shift(self, fit: Regression, columns: Array) -> Array:
+        """Shift (p, m) of the values by each column (n, c, m), over u."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(self.slope @ fit.shift(columns) / self.u[:, None])
+
+
+def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: Unit) -> Iterator[Finding]:
+    """Findings of significant faults, and of those that the test would not show."""
+    shown = (unit.factor, unit.symbol)
+    for each in examination.significant:
+        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])[:, 0]
+        most = np.abs(shift) + _hidden(each, fit, scale)
+        harm = tuple(name for name, by in zip(scale.names, most, strict=True) if by > LIMITS.harmful_shift)
+        text = (
+            f"{each.fault.what} of {each.fault.size(each.values, shown)} (by chance with a probability of "
+            f"{each.chance:.1g}) shifts {_largest(scale.names, shift)}"
+        )
+        yield Finding(each.fault.code, text, "", harm, action=_REMEDY[each.fault.code])
+    worst: dict[str, Blind] = {}
+    for seen in examination.asked:
+        blind, kind = _blind(seen, fit, scale, shown), seen.fault.kind
+        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift)).shift:
+            worst[kind] = blind
+    if worst:
+        yield _weak(worst.values())
+
+
+@dataclass(frozen=True)
+class Blind:
+    """A fault that the residuals may miss: the largest ``shift`` of a value, over u, by one that is named in half of
+    the tests, infinite where none is; ``what`` it is, its ``size`` that shifts this ``value`` by 2 u."""
+
+    shift: float
+    what: str = ""
+    size: str = ""
+    value: str = ""
+
+
+def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> Blind:
+    """The part of a fault that a test may miss: one that does not show, if it shifts any value, or else all of it."""
+    effect = scale.shift(fit, seen.fault.columns)
+    for base, reach in ((seen.hidden, np.inf), (seen.base, seen.reach)):
+        shift = effect @ base
+        size = np.linalg.norm(shift, axis=1)
+        worst = int(np.argmax(size))
+        if size[worst] > _ROUNDING * np.linalg.norm(effect):
+            values = base @ shift[worst] * 2.0 / size[worst] ** 2
+            told = seen.fault.size(values, shown)
+            return Blind(reach * float(size[worst]), seen.fault.what, told, scale.names[worst])
+    return Blind(0.0)
+
+
+def _weak(blind: Collection[Blind]) -> Finding:
+    """``weak_test``: faults that would shift a value by 2 u, and hardly show, or not at all."""
+    return Finding(
+        "weak_test",
+        f"This test cannot rule out {counted(len(blind), 'fault')} that would shift a value by 2 u.",
+        action="Shuffle the positions, take more of them, or repeat the first ones at the end.",
+        items=tuple(
+            {
+                "fault": each.what.rstrip(","),
+                "size that shifts the value by 2 u": each.size,
+                "value": each.value,
+                "residuals": "might not show it" if np.isfinite(each.shift) else "cannot show it",
+            }
+            for each in blind
+        ),
+    )
+
+
+def _hidden(tested: Tested, fit: Regression, scale: Scale) -> Array:
+    """Shift (p,) of the values, over u, by the part of a fault that does not show, were it as large as the rest."""
+    seen = tested.seen
+    size = float(np.linalg.norm(tested.values)) / np.sqrt(max(seen.base.shape[1], 1))
+    return np.asarray(size * np.linalg.norm(scale.shift(fit, seen.fault.columns) @ seen.hidden, axis=1))
+
+
+def doubts(examination: Examination, fit: Regression, scale: Scale) -> list[TypeB]:
+    """Sources of uncertainty: faults that do no harm, and those that may be there, with their probability.
+
+    With the probability P that a fault is there a value is off by its shift s, known to b, or by none: its mean square
+    error is larger by ``P (s^2 + b^2)``.
+    """
+    sources = []
+    for each in examination.significant:
+        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])
+        if (np.abs(shift[:, 0]) + _hidden(each, fit, scale)).max() <= LIMITS.harmful_shift:
+            sources.append(_source(each, shift * scale.u[:, None]))
+    for each in examination.doubtful:
+        shift = scale.shift(fit, each.fault.effect(each.values)[..., None])
+        spread = scale.shift(fit, each.fault.columns) @ each.seen.base
+        reach = each.seen.reach * np.linalg.norm(spread, axis=1, keepdims=True)
+        part = np.sqrt(each.probability) * LIMITS.blind_shift / np.maximum(reach, LIMITS.blind_shift)
+        sources.append(_source(each, part * np.hstack([shift, spread]) * scale.u[:, None]))
+    return sources
+
+
+def _source(tested: Tested, shifts: Array) -> TypeB:
+    """A fault as a source of ``shifts`` (p, q) of the values; the base and the table are the same in repeat runs."""
+    return TypeB(f"{tested.fault.what}, not excluded", 1.0, "1", shifts, redrawn=tested.fault.kind in _DRIFTS)
+
+
+def _largest(names: Sequence[str], shift: Array) -> str:
+    """The values that are shifted most, in words."""
+    order = np.argsort(-np.abs(shift))[:_SHOWN]
+    texts = [f"{names[k]} by {shift[k]:+.1f} u" for k in order if abs(shift[k]) > 0.1]
+    return ", ".join(texts) or "no value by more than 0.1 u"

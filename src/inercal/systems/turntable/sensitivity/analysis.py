@@ -1,0 +1,258 @@
+"""The sensitivity of a table: which error of the rig matters for what the instrument should read."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import StudyError
+from inercal.foundation.estimate.executors import Executor
+from inercal.foundation.estimate.rounding import concise
+from inercal.foundation.estimate.table import aligned
+from inercal.foundation.records.places import counted
+from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.sensitivities import averages
+from inercal.foundation.sensitivities.averages import Averages, Flag
+from inercal.foundation.sensitivities.indices import Indices, joined
+from inercal.systems.turntable.sensitivity import drift
+from inercal.systems.turntable.sensitivity.drift import drift_output
+from inercal.systems.turntable.settings import TurntableSettings
+
+_INDICES = (
+    "I. M. Sobol, Sensitivity estimates for nonlinear mathematical models, Mathematical Modelling and Computational "
+    "Experiment 1 (1993) 407-414",
+    "F. Gamboa, A. Janon, T. Klein, A. Lagnoux, Sensitivity analysis for multidimensional and functional outputs, "
+    "Electronic Journal of Statistics 8 (2014) 575-603",
+)
+
+_BY_METHOD = {
+    "exact": (
+        "A. B. Owen, Sobol' indices and Shapley value, SIAM/ASA Journal on Uncertainty Quantification 2 (2014) 245-251",
+    ),
+    "sampled": (
+        "A. Saltelli et al., Variance based sensitivity analysis of model output, Computer Physics Communications 181 "
+        "(2010) 259-270",
+    ),
+    "local": ("JCGM 100:2008, Guide to the expression of uncertainty in measurement",),
+}
+"""Publications behind each method."""
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class Analysed:
+    """A sensitivity analysis: ``indices`` at each position, and averages over them.
+
+    ``joints`` names the columns of `Indices.angles`, ``what`` says each factor in words, ``note`` is for the
+    user (may be empty), ``solve`` is the time of the computation alone [s].
+    """
+
+    indices: Indices
+    joints: tuple[str, ...]
+    what: tuple[str, ...]
+    note: str = ""
+    solve: float = field(default=0.0, compare=False)
+
+    @cached_property
+    def mean(self) -> Averages:
+        """Mean over positions (o, k), as in Zhao et al. 2023."""
+        return averages.mean(self.indices)
+
+    @cached_property
+    def weighted(self) -> Averages:
+        """Parts summed over positions, over the variance summed (o, k)."""
+        return averages.weighted(self.indices)
+
+    @cached_property
+    def aggregate(self) -> Averages:
+        """All outputs and positions together (k,), each output divided by its scale."""
+        return averages.aggregate(self.indices)
+
+    @cached_property
+    def flagged(self) -> tuple[Flag, ...]:
+        """Outputs and positions where interactions rule."""
+        return averages.flagged(self.indices)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The publications behind the indices and the method."""
+        return _INDICES + _BY_METHOD[self.indices.method["name"]]
+
+    @property
+    def message(self) -> str:
+        """The result in a sentence."""
+        indices = self.indices
+        size = (
+            f"{counted(len(indices.factors), 'error')}, {counted(len(indices.outputs), 'output')}, "
+            f"{counted(len(indices.angles), 'position')}"
+        )
+        if not np.any(indices.variance > 0.0):
+            return f"{size}; these errors do not move these outputs there"
+        top = [indices.factors[k] for k in np.argsort(-self.aggregate.total, kind="stable")[:3]]
+        head = f"{size}; the largest shares are those of {', '.join(top)}"
+        if not self.flagged:
+            return head
+        places = len({flag.angles for flag in self.flagged})
+        return f"{head}; interactions rule at {places} of the positions"
+
+
+def analyse(
+    settings: TurntableSettings,
+    maps: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[int, int], None] | None = None,
+    executor: Executor | None = None,
+) -> Analysed:
+    """Analyse the study's table by the study's method.
+
+    Parameters
+    ----------
+    settings : TurntableSettings
+    maps : bool
+        Shapley effects and second-order parts too; only the exact method has them.
+    say : callable
+        Told, in words, what takes long before the computation begins.
+    progress : callable, optional
+        Told the positions done and all of them.
+    executor : Executor, optional
+        Place in which positions are sampled.
+
+    Raises
+    ------
+    StudyError
+        A table without errors, rates without a latitude.
+    """
+    chain, how = settings.chain, settings.analysis
+    if not chain.errors:
+        raise StudyError(
+            "rig.errors",
+            'found no errors of the table, expected some such as default = { uniform = "2 arcmin" }',
+        )
+    of_rig = [name for name in how.outputs if not name.startswith("y_")]
+    drifts = [drift_output(settings, name) for name in how.outputs if name.startswith("y_")]
+    outputs = table_outputs(of_rig, settings.site.gravity, settings.site.latitude)
+    angles, note = settings.plan.angles, ""
+    if how.method == "exact":
+        from inercal.foundation._jit import compiling
+        from inercal.foundation.sensitivities import exact
+
+        if outputs:
+            with compiling("sensitivity", say):
+                exact.analyse(chain, outputs[:1], angles[:1], second=maps)
+        clock = time.perf_counter()
+        parts = [exact.analyse(chain, outputs, angles, shapley=maps, second=maps)] if outputs else []
+        parts += [drift.exact(settings, drifts, angles, maps, maps)] if drifts else []
+        indices = _together(parts)
+    elif how.method == "sampled":
+        from inercal.foundation.sensitivities import sampled
+
+        clock = time.perf_counter()
+        rng = np.random.default_rng(how.seed)
+        indices = sampled.analyse(
+            chain, [*outputs, *drifts], angles, how.samples, rng, how.sampling, progress, executor
+        )
+        indices = replace(indices, method={**indices.method, "seed": how.seed})
+        taken = indices.method["samples"]
+        if taken != how.samples:
+            note = f"{how.samples} samples rounded up to {taken}, a power of two, for Sobol points"
+    else:
+        from inercal.foundation.sensitivities import local
+
+        clock = time.perf_counter()
+        indices = local.analyse(chain, [*outputs, *drifts], angles)
+    solve = time.perf_counter() - clock
+    return Analysed(indices, chain.joints, tuple(error.what for error in chain.errors), note, solve)
+
+
+def _together(parts: Sequence[Indices]) -> Indices:
+    """Indices of several groups of outputs as one."""
+    return joined(
+        parts,
+        axis=0,
+        outputs=tuple(name for part in parts for name in part.outputs),
+        units=tuple(unit for part in parts for unit in part.units),
+        scales=np.concatenate([part.scales for part in parts]),
+    )
+
+
+def result(analysed: Analysed) -> dict[str, Any]:
+    """The command's own part of the JSON result: the contract's keys, arrays as arrays."""
+    indices = analysed.indices
+    return {
+        "factors": indices.factors,
+        "outputs": indices.outputs,
+        "positions": {joint: analysed.indices.angles[:, k] for k, joint in enumerate(analysed.joints)},
+        "mean": {**_plain(analysed.mean), **_shapley(indices, averages.mean)},
+        "weighted": {**_plain(analysed.weighted), **_shapley(indices, averages.weighted)},
+        "aggregate": {"outputs": indices.outputs, **_plain(analysed.aggregate)},
+        "flagged": [
+            {
+                "output": flag.output,
+                **dict(zip(analysed.joints, flag.angles, strict=True)),
+                "sum_first": flag.sum_first,
+                **({} if indices.resampled is None else {"u_sum_first": flag.u}),
+            }
+            for flag in analysed.flagged
+        ],
+        "method": indices.method,
+    }
+
+
+def table(analysed: Analysed) -> str:
+    """The errors as aligned text, those with the largest shares first."""
+    indices, share, mean = analysed.indices, analysed.aggregate, analysed.mean
+    u_mean = [None] * len(mean.first) if mean.u_first is None else mean.u_first
+    head = ("", "S", "ST", *(f"S {output}" for output in indices.outputs), "")
+    rows = [
+        (
+            indices.factors[k],
+            _number(share.first, share.u_first, k),
+            _number(share.total, share.u_total, k),
+            *(_number(*of_output, k) for of_output in zip(mean.first, u_mean, strict=True)),
+            analysed.what[k],
+        )
+        for k in np.argsort(-share.total, kind="stable")
+    ]
+    return "\n".join(
+        [
+            *aligned([head, *rows], (0, len(head) - 1)),
+            "",
+            f"S, ST: first and total order over {', '.join(indices.outputs)} and all positions, each output in "
+            "units of its reference",
+            "S of an output: mean of its first-order indices over the positions",
+            *(
+                []
+                if share.u_first is None
+                else ["in brackets the standard uncertainty by sampling, of the last digits"]
+            ),
+        ]
+    )
+
+
+def _plain(means: Averages) -> Mapping[str, Array]:
+    """Averages by name, those there are."""
+    return {name: values for name, values in vars(means).items() if values is not None}
+
+
+def _shapley(indices: Indices, average: Callable[[Indices], Averages]) -> Mapping[str, Array]:
+    """Shapley effects, averaged as if they were parts of variance; none where they were not computed."""
+    if indices.shapley is None:
+        return {}
+    parts = np.nan_to_num(indices.shapley) * indices.variance[..., None]
+    return {"shapley": average(replace(indices, first_variance=parts)).first}
+
+
+def _number(shares: Array, u: Array | None, k: int) -> str:
+    """Index k in a column: to its uncertainty where it is sampled, else three digits, or its size."""
+    share = float(shares[k])
+    if np.isnan(share):
+        return "-"
+    if u is not None and u[k] > 0.0:
+        return concise(share, float(u[k]))
+    return f"{share:.4f}" if share >= 5e-5 or share == 0.0 else f"{share:.0e}"
