@@ -308,8 +308,10 @@ def limits() -> str:
     import inercal
 
     parts = []
-    for path in sorted(Path(inercal.__file__).parent.glob("*/limits.py")):
-        module = import_module(f"inercal.{path.parent.name}.limits")
+    package = Path(inercal.__file__).parent
+    for path in sorted(package.rglob("limits.py"), key=lambda path: path.parent.name):
+        name = ".".join(path.relative_to(package).with_suffix("").parts)
+        module = import_module(f"inercal.{name}")
         meanings = _meanings(path.read_text(encoding="utf-8"), type(module.LIMITS).__name__)
         rows = [(code(name), *_value(value, meanings[name])) for name, value in vars(module.LIMITS).items()]
         parts.append(f"## {path.parent.name}\n\n" + table(("limit", "value", "meaning"), rows))

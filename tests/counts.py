@@ -13,12 +13,46 @@ from collections.abc import Iterator, Mapping
 
 SYSTEMS = ("imu", "strapdown", "turntable", "selfcal", "aoa")
 
+#: folders of the package that hold rooms, lowest first, and their rooms, lowest first; those on one line share a floor
+HOUSES = {
+    "foundation": (
+        "addresses arrays errors inputs",
+        "findings units",
+        "_jit _files _toml keys",
+        "geometry",
+        "instruments",
+        "records",
+        "rigs",
+        "estimate",
+        "noise",
+        "sensitivities",
+        "designs",
+    ),
+    "systems": (" ".join(SYSTEMS),),
+    "faces": ("convert", "studies", "report", "stream", "validate", "python"),
+    "laboratory": ("fleet",),
+    "bench": ("live", "workbench"),
+}
+
 Trees = Mapping[str, ast.Module]
+
+
+def placed(module: str) -> tuple[str, tuple[str, ...]]:
+    """Room of a module, and its place there: ``records`` and ``read, text`` of
+    ``inercal.foundation.records.read.text``.
+
+    What lies in a house, but in none of its rooms, is in a room of the name of the house.
+    """
+    _, *parts = module.split(".")
+    rooms = " ".join(HOUSES.get(parts[0], ())).split() if parts else []
+    if len(parts) > 1 and parts[1] in rooms:
+        parts = parts[1:]
+    return (parts[0], tuple(parts[1:])) if parts else ("inercal", ())
 
 
 def room(module: str) -> str:
     """``records`` of ``inercal.foundation.records.read.text``; ``inercal`` of the package itself."""
-    return [*module.split("."), "inercal"][1]
+    return placed(module)[0]
 
 
 def folder(module: str, trees: Trees) -> str:

@@ -50,6 +50,7 @@ Uncertainty
     an `inercal.foundation.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
 
 Map, lower floors first; each imports only from those above its own line
+    foundation: what all share
     addresses, arrays,         addresses without secrets; the type of arrays; what goes wrong; files that a result
     errors, inputs             rests on
     findings, units            what is said of a recording or result, and the verdict; texts with units
@@ -64,6 +65,10 @@ Map, lower floors first; each imports only from those above its own line
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
     designs                    candidates, criteria, exchange, search, comparison
+
+    examples                   recordings that ship
+
+    systems: contract (what a system offers), listed (all of them), and a room for each
     imu                        multiposition (poses, accelerometer, turns, gyro), means, known_rates, known_turns,
                                ferraris, aided, temperature, task
     strapdown                  coefficients, kernels, samples, rests, batch, error_state, restricted, averaged,
@@ -73,16 +78,21 @@ Map, lower floors first; each imports only from those above its own line
                                before (bounds, observability, path_design, simulate), diagnosis, result, task
     aoa                        layout, motion, simulate; reading, fusion (model, loop, smoother), paper (static, lever,
                                frequency), reference, diagnosis, result, task
-    systems                    contract (what a system offers), listed (all of them)
+
+    faces: what people and programs meet
     convert                    calibrations applied; to and from imu_tk, imucal, kalibr, psins
-    studies, report, examples  files people write; pages people read; recordings that ship
+    studies, report            files people write; pages people read
     stream                     line in, line out; state saved and resumed
-    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     validate                   cases with published or closed-form numbers, run by `inercal validate`
-    face                       the verbs of Python, and the results that they give back
+    python                     the verbs of Python, and the results that they give back
+
+    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
     fleet                      many units of one make: batch, capability, outliers
+
+    bench: a measurement while it runs, and the commands in a browser
     live                       an instrument by wire: sources, frames, sinks, a measurement that runs
-    workbench                  the commands in a browser
+    workbench                  sessions, jobs, a page each, REST
+
     cli                        one module per verb
 """
 
@@ -92,8 +102,6 @@ if TYPE_CHECKING:
     from inercal.faces.python.calibrations import apply as apply
     from inercal.faces.python.calibrations import compare as compare
     from inercal.faces.python.calibrations import load as load
-    from inercal.faces.python.laboratory import history as history
-    from inercal.faces.python.laboratory import keep as keep
     from inercal.faces.python.noise import allan as allan
     from inercal.faces.python.recordings import read as read
     from inercal.faces.python.recordings import record as record
@@ -111,6 +119,8 @@ if TYPE_CHECKING:
     from inercal.foundation.estimate.result import Estimate as Estimate
     from inercal.foundation.records.record import Record as Record
     from inercal.laboratory.fleet.batch import batch as batch
+    from inercal.laboratory.verbs import history as history
+    from inercal.laboratory.verbs import keep as keep
 
 __version__ = "0.2.0"
 
@@ -118,17 +128,17 @@ __version__ = "0.2.0"
 _WHERE = {
     name: f"inercal.{module}"
     for module, names in {
-        "errors": ("CalibrationError", "InputError"),
-        "estimate.result": ("Estimate",),
-        "face.calibrations": ("apply", "compare", "load"),
-        "face.laboratory": ("history", "keep"),
-        "face.noise": ("allan",),
-        "face.recordings": ("read", "record"),
-        "face.result": ("Result",),
-        "face.study": ("Study", "study"),
-        "face.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
-        "fleet.batch": ("batch",),
-        "records.record": ("Record",),
+        "faces.python.calibrations": ("apply", "compare", "load"),
+        "faces.python.noise": ("allan",),
+        "faces.python.recordings": ("read", "record"),
+        "faces.python.result": ("Result",),
+        "faces.python.study": ("Study", "study"),
+        "faces.python.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
+        "foundation.errors": ("CalibrationError", "InputError"),
+        "foundation.estimate.result": ("Estimate",),
+        "foundation.records.record": ("Record",),
+        "laboratory.fleet.batch": ("batch",),
+        "laboratory.verbs": ("history", "keep"),
     }.items()
     for name in names
 }

@@ -11,12 +11,12 @@ from jsonschema import Draft202012Validator
 from new_studies import filled
 
 import inercal as ic
-from inercal.bench.live.estimators import of_study
 from inercal.bench.workbench.plans import lines_of, named, with_lines
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.faces.python.study import kind_of, read_study
 from inercal.faces.stream import run as stream
+from inercal.faces.stream.estimators import of_study
 from inercal.faces.stream.lines import Lines
 from inercal.faces.studies.schema import json_schema
 from inercal.faces.studies.text import parsed, with_keys

@@ -1,1 +1,1 @@
-"""The commands in a browser, and an instrument by wire."""
+"""The commands in a browser, and instruments by wire."""

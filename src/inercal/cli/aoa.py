@@ -209,7 +209,7 @@ def _live(
     output: ResultOutput,
 ) -> Estimators:
     """Prepare a measurement row by row; ``made`` receives it."""
-    from inercal.bench.live.estimators import aoa as prepared
+    from inercal.faces.stream.estimators import aoa as prepared
 
     make = prepared(settings, interval, output.say, output.say_finding)
 

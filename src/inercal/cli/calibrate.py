@@ -84,7 +84,7 @@ def calibrate_strapdown(
 
 def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) -> Estimators:
     """Prepare a calibration rest by rest."""
-    from inercal.bench.live.estimators import strapdown as prepared
+    from inercal.faces.stream.estimators import strapdown as prepared
 
     return prepared(settings, output.say, output.say_finding)
 

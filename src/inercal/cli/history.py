@@ -36,10 +36,10 @@ def history(
     """Follow the coefficients of an instrument from calibration to calibration."""
     from datetime import date
 
-    from inercal.faces.python.laboratory import history as history_of
-    from inercal.faces.python.laboratory import specification_in
     from inercal.foundation._files import write_text
     from inercal.laboratory.history_page import rows_csv
+    from inercal.laboratory.verbs import history as history_of
+    from inercal.laboratory.verbs import specification_in
 
     try:
         day = None if until is None else date.fromisoformat(until)

@@ -18,8 +18,8 @@ from inercal.foundation.errors import InercalError, InputError
 
 if TYPE_CHECKING:
     from inercal.bench.live.address import Sink
-    from inercal.bench.live.estimators import Make, Say, SayFinding
     from inercal.bench.live.measurement import Measurement
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
 
 _EVERY = 30.0
 """Time [s] from one line of counts to the next."""
@@ -96,7 +96,7 @@ def _estimator(
         of = read_study(kind_of(study), study, keys)
 
         def by_study(say: Say, say_finding: SayFinding) -> Make:
-            from inercal.bench.live.estimators import of_study
+            from inercal.faces.stream.estimators import of_study
 
             return of_study(of, interval, say, say_finding)
 

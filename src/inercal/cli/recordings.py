@@ -91,7 +91,7 @@ def monitor(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Tell rest from motion, live, and measure the noise at rest."""
-    from inercal.bench.live.estimators import monitor as prepared
+    from inercal.faces.stream.estimators import monitor as prepared
 
     interval = interval_of(every)
     streaming.check(output, (file, map_file))

@@ -89,6 +89,6 @@ def selfcal(
 
 def _live(settings: SelfcalSettings, interval: float, output: ResultOutput, until_goals: bool) -> Estimators:
     """Prepare a calibration row by row."""
-    from inercal.bench.live.estimators import selfcal as prepared
+    from inercal.faces.stream.estimators import selfcal as prepared
 
     return prepared(settings, interval, output.say, output.say_finding, until_goals)

@@ -1,1 +1,1 @@
-"""What people and programs meet: study files, pages, streams, verbs of Python, conversion, validation."""
+"""Study files, pages, streams, conversion, validation and the verbs of Python: all that people and programs meet."""

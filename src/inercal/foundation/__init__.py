@@ -1,1 +1,1 @@
-"""The shared floors: data, geometry, instruments, rigs, results, inference."""
+"""Shared floors: data, geometry, instruments, rigs, statistics of results."""

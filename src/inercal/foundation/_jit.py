@@ -21,7 +21,7 @@ import numba.core.config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def source_hash(package: Path = PACKAGE) -> str:

@@ -1,1 +1,1 @@
-"""The systems: what each of them offers, and the list of them."""
+"""The systems: a room for each, what each of them offers, and the list of them."""

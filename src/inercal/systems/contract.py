@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
 
-    from inercal.bench.live.estimators import Make, Say, SayFinding
     from inercal.faces.python.result import Result
     from inercal.faces.python.study import Study
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
     from inercal.faces.validate.case import Case
     from inercal.foundation._toml import Strict
     from inercal.foundation.arrays import Array

@@ -29,7 +29,7 @@ from inercal.foundation.errors import InercalError, InputError, RecordError
 from inercal.foundation.findings import Finding
 
 if TYPE_CHECKING:
-    from inercal.bench.live.estimators import Make, Say, SayFinding
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
     from inercal.foundation.records.maps import RecordMap
 
 KEPT, THIN = 3000, 0.02
@@ -333,8 +333,8 @@ def measure(
     InputError
         An address, study or map that is wrong in itself. What fails later is in `Measurement.failure`.
     """
-    from inercal.bench.live.estimators import of_study
     from inercal.faces.python.study import study_of
+    from inercal.faces.stream.estimators import of_study
 
     wire, sinks, of = source_of(source), [sink_of(each) for each in to], study_of(study)
     record_map = None

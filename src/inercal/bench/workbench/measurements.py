@@ -26,7 +26,7 @@ from inercal.foundation.records.maps import read_map
 from inercal.systems.listed import SYSTEMS
 
 if TYPE_CHECKING:
-    from inercal.bench.live.estimators import Make, Say, SayFinding
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
 
 FOLDER = "live"
 """Folder of recordings and sinks in that of a session."""
@@ -141,8 +141,8 @@ def interval_of(text: str) -> float:
 
 def _prepared(session: Session, wish: Wish) -> Live:
     """A measurement that has not begun; raises `InputError`."""
-    from inercal.bench.live.estimators import of_study
     from inercal.faces.python.study import read_study
+    from inercal.faces.stream.estimators import of_study
 
     if session.study is None:
         raise InputError(session.title, "found no study, expected one that says what is measured")

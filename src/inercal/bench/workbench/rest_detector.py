@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from inercal.foundation.errors import InercalError
 
 if TYPE_CHECKING:
-    from inercal.bench.live.estimators import Make
+    from inercal.faces.stream.estimators import Make
     from inercal.faces.stream.lines import Lines, Sample
     from inercal.faces.stream.monitor import Monitor
     from inercal.faces.stream.run import Output, Recursive

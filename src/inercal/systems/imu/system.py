@@ -11,9 +11,9 @@ from inercal.systems.contract import Channels, System
 if TYPE_CHECKING:
     import numpy as np
 
-    from inercal.bench.live.estimators import Make, Say, SayFinding
     from inercal.faces.python.result import Result
     from inercal.faces.python.study import Study
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
     from inercal.faces.validate.case import Case
     from inercal.foundation._toml import Strict
     from inercal.foundation.records.record import Record
@@ -59,7 +59,7 @@ def _simulate(study: Study, rng: np.random.Generator) -> Record:
 
 
 def _stream(settings: ImuSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
-    from inercal.bench.live.estimators import monitor
+    from inercal.faces.stream.estimators import monitor
 
     return monitor(interval, say)
 

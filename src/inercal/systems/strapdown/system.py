@@ -11,9 +11,9 @@ from inercal.systems.contract import Channels, Design, Plan, System
 if TYPE_CHECKING:
     import numpy as np
 
-    from inercal.bench.live.estimators import Make, Say, SayFinding
     from inercal.faces.python.result import Result
     from inercal.faces.python.study import Study
+    from inercal.faces.stream.estimators import Make, Say, SayFinding
     from inercal.faces.validate.case import Case
     from inercal.foundation._toml import Strict
     from inercal.foundation.arrays import Array
@@ -73,7 +73,7 @@ def _prepare_design(study: Study) -> None:
 
 
 def _stream(settings: StrapdownSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
-    from inercal.bench.live.estimators import strapdown
+    from inercal.faces.stream.estimators import strapdown
 
     return strapdown(settings, say, say_finding)
 

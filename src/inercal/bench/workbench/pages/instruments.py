@@ -77,7 +77,7 @@ def add(bench: Bench) -> None:
 
 async def _history(bench: Bench, serial: str) -> None:
     """The course of each coefficient of an instrument; raises `InputError`."""
-    from inercal.faces.python.laboratory import history
+    from inercal.laboratory.verbs import history
 
     heading("History")
     result = await asyncio.to_thread(history, serial, store=bench.store)

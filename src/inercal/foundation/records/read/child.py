@@ -156,7 +156,7 @@ def _spawned(work: Work[Any], size: int, progress: Tell) -> _Ended:
     with tempfile.TemporaryDirectory(prefix="inercal-") as folder:
         name = Path(folder, "answer")
         command = [sys.executable, "-P", "-m", __name__, str(name)]
-        package = str(Path(__file__).parents[3])
+        package = str(Path(__file__).parents[4])
         before = os.environ.get("PYTHONPATH")  # an empty part would be the working folder, anybody's
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, before)))}
         child = subprocess.Popen(
