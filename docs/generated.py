@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib import import_module
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -309,7 +309,8 @@ def limits() -> str:
 
     parts = []
     package = Path(inercal.__file__).parent
-    for path in sorted(package.rglob("limits.py"), key=lambda path: path.parent.name):
+    found = [*package.glob("*/limits.py"), *package.glob("*/*/limits.py")]
+    for path in sorted(found, key=lambda path: path.parent.name):
         name = ".".join(path.relative_to(package).with_suffix("").parts)
         module = import_module(f"inercal.{name}")
         meanings = _meanings(path.read_text(encoding="utf-8"), type(module.LIMITS).__name__)
@@ -337,6 +338,31 @@ def _value(value: float, meaning: str) -> tuple[str, str]:
     whole = unit[1].startswith("rad") and abs(degrees - round(degrees, 2)) < 1e-9
     shown = f"{degrees:.6g} {unit[1].replace('rad', 'deg')}" if whole else f"{value:g} {unit[1]}"
     return shown, meaning.replace(unit[0], "", 1)
+
+
+# systems --------------------------------------------------------------------------------------------------------------
+
+
+def offers() -> str:
+    """What a system may offer, from the fields of its record, and which of the systems do."""
+    from inercal.systems import contract
+    from inercal.systems.listed import SYSTEMS
+
+    meanings = _meanings(inspect.getsource(contract), "System")
+    default = {field.name: field.default for field in fields(contract.System)}
+    given = {
+        name: [
+            code(kind)
+            for kind, system in SYSTEMS.items()
+            if getattr(system, name) and getattr(system, name) is not default[name]
+        ]
+        for name in meanings
+    }
+    rows = [
+        (code(name), meaning, "all" if len(given[name]) == len(SYSTEMS) else ", ".join(given[name]))
+        for name, meaning in meanings.items()
+    ]
+    return table(("of a system", "what it is", "offered by"), rows)
 
 
 # Python ---------------------------------------------------------------------------------------------------------------
@@ -375,6 +401,7 @@ PARTS: dict[str, Callable[..., str]] = {
         noise_terms,
         reference_types,
         limits,
+        offers,
         public,
         words,
     )
