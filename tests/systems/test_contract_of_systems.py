@@ -139,7 +139,10 @@ def test_a_result_is_shown_saved_and_loaded_whatever_its_verdict(kind, spoilt, t
     assert len(repr(result).splitlines()) == 3
     assert result.plot().axes
     assert result.report(tmp_path / "page.html").stat().st_size > 10_000
-    assert list(result.to_dataframe()["value_si"]) == list(result.values.values())
+    frame = result.to_dataframe()
+    assert list(frame["value_si"]) == list(result.values.values())
+    assert list(frame["unit"]) == list(result.view.shown.units)
+    assert list(frame["value"]) == result.view.shown.values.tolist()
     np.testing.assert_array_equal(result.to_xarray()["covariance"], result.estimate.covariance)
     again = ic.load(result.save(tmp_path / "cal.json"))
     assert again.values == result.values
@@ -149,6 +152,19 @@ def test_a_result_is_shown_saved_and_loaded_whatever_its_verdict(kind, spoilt, t
     assert again.report(tmp_path / "again.html").exists()
     if result.view.rows is not None:
         assert result.save(tmp_path / "rows.csv").stat().st_size > 1000
+
+
+@every_system
+def test_a_page_and_its_pictures_stand_at_every_verdict(kind, test_of, tmp_path):
+    _, _, _, result = test_of(kind)
+    saved = json.loads(result.save(tmp_path / "cal.json").read_text())
+    for status in Status:
+        verdict = {"code": status.value, "message": "the verdict in a sentence"}
+        (tmp_path / "other.json").write_text(json.dumps({**saved, "status": verdict}))
+        again = ic.load(tmp_path / "other.json")
+        assert again.status is status
+        assert "the verdict in a sentence" in again.view.page()
+        assert again.plot().axes
 
 
 def streamed(study, lines, checkpoint=None):
