@@ -310,7 +310,7 @@ CEILINGS = {
     "names used across folders": 1389,
     "class names shared": 95,
     "constants outside Limits": 455,
-    "modules": 666,
+    "modules": 669,
 }
 
 

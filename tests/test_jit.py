@@ -53,13 +53,12 @@ print(_jit.cache_folder())
 def test_a_changed_callee_changes_the_result_of_its_cached_caller(tmp_path):
     """numba's own cache would give the old number here: it hashes the caller's file alone."""
     package = tmp_path / "tiny"
-    package.mkdir()
-    shutil.copy(PACKAGE / "_jit.py", package)
-    (package / "__init__.py").touch()
-    callee = "from tiny._jit import kernel\n\n@kernel\ndef inner(x):\n    return x + {}\n"
+    (package / "foundation").mkdir(parents=True)
+    shutil.copy(PACKAGE / "foundation" / "_jit.py", package / "foundation")
+    callee = "from tiny.foundation._jit import kernel\n\n@kernel\ndef inner(x):\n    return x + {}\n"
     (package / "callee.py").write_text(callee.format(1.0))
     (package / "caller.py").write_text(
-        "from tiny._jit import kernel\nfrom tiny.callee import inner\n\n"
+        "from tiny.foundation._jit import kernel\nfrom tiny.callee import inner\n\n"
         "@kernel\ndef outer(x):\n    return 10.0 * inner(x)\n"
     )
     program = "from tiny.caller import outer; print(outer(1.0), sum(outer.stats.cache_misses.values()))"

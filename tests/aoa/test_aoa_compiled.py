@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-import inercal.systems.aoa
+import inercal
 
 RUN = """
 import json
@@ -45,7 +45,7 @@ print(json.dumps({"found": found, "missed": missed, "types": types}))
 
 def ran(**environment):
     """What a new process finds on a tenth of a second with the filter and the smoother."""
-    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.systems.aoa.__file__)))
+    package = os.path.dirname(os.path.dirname(inercal.__file__))
     studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
     done = subprocess.run(
         [sys.executable, "-c", RUN],

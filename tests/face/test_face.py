@@ -330,8 +330,9 @@ def test_verbs_survive_any_order_of_imports():
 @pytest.mark.parametrize(
     "module",
     [
-        *(f"face.{room}" for room in ("recordings", "study", "verbs", "noise", "calibrations", "laboratory")),
-        "fleet.batch",
+        *(f"faces.python.{room}" for room in ("recordings", "study", "verbs", "noise", "calibrations")),
+        "laboratory.verbs",
+        "laboratory.fleet.batch",
     ],
 )
 def test_the_examples_of_the_verbs_run(module):

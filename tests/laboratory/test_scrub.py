@@ -40,7 +40,7 @@ STORE = f"postgresql://lab:{SECRET}@host/db"
 def secrets_of_old(monkeypatch):
     """What 0.2.0 did with secrets: nothing."""
     for module in (
-        "estimate.files",
+        "foundation.estimate.files",
         "laboratory.keep",
         "laboratory.supersede",
         "laboratory.certificate.written",

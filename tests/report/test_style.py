@@ -59,11 +59,11 @@ def test_others_settings_do_not_matter():
 
 def test_nothing_heavy_is_imported_before_it_is_needed():
     names = (
-        "report.html",
-        "report.inspection",
-        "report.style",
-        "imu.multiposition.figures",
-        "turntable.figures",
+        "faces.report.html",
+        "faces.report.inspection",
+        "faces.report.style",
+        "systems.imu.multiposition.figures",
+        "systems.turntable.figures",
     )
     modules = ", ".join(f"inercal.{name}" for name in names)
     code = f"import sys, {modules}; print({{'matplotlib', 'jinja2', 'pyplot'}} & set(sys.modules))"

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-import inercal.systems.selfcal
+import inercal
 
 RUN = """
 import json, sys
@@ -51,7 +51,7 @@ print(json.dumps({"found": found, "missed": missed}))
 
 def ran(**environment):
     """What a new process finds on a short path with all recursive filters, the bounds, and what is not fitted."""
-    package = os.path.dirname(os.path.dirname(os.path.dirname(inercal.systems.selfcal.__file__)))
+    package = os.path.dirname(os.path.dirname(inercal.__file__))
     studies = os.path.join(os.path.dirname(os.path.dirname(__file__)), "studies")
     paths = os.pathsep.join([package, studies])
     done = subprocess.run(

@@ -16,7 +16,7 @@ KERNELS = ("kernel", "merged", "inlined", "allocating")
 def compiled():
     """Module, name of the decorator, and tree of each compiled function of the room."""
     for path in sorted(FOLDER.rglob("*.py")):
-        module = ".".join(("inercal", "selfcal", *path.relative_to(FOLDER).with_suffix("").parts))
+        module = ".".join(("inercal", "systems", "selfcal", *path.relative_to(FOLDER).with_suffix("").parts))
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for decorator in getattr(node, "decorator_list", ()):
                 if isinstance(node, ast.FunctionDef) and getattr(decorator, "id", "") in KERNELS:

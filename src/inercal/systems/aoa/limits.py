@@ -10,8 +10,7 @@ from inercal.foundation.units import STANDARD_GRAVITY
 
 @dataclass(frozen=True)
 class Limits:
-    """Thresholds, in SI where nothing else is said; misfits are those of
-    `inercal.systems.aoa.diagnosis.fit_quality`."""
+    """Thresholds, in SI where nothing else is said; misfits as in `inercal.systems.aoa.diagnosis.fit_quality`."""
 
     judged_rows: int = 6000
     """Rows of the liveliest stretch, which is judged in the place of the whole."""
