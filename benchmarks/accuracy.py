@@ -18,7 +18,7 @@ from sting_bands import FIGURES, FILTERS, PAPER, UPPER, errors_of, judged
 
 from inercal.examples import FOLDER
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.foundation.estimate.executors import Threads
+from inercal.foundation.computing.executors import Threads
 from inercal.systems.selfcal.monte_carlo import campaign
 
 SEED = 20261121

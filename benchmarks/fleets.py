@@ -20,8 +20,8 @@ from measure import Row, alone, in_turn, row
 
 from inercal.examples import FOLDER
 from inercal.faces.python.study import read_study
-from inercal.foundation.estimate.cluster import LOCAL, Cluster
-from inercal.foundation.estimate.executors import Executor, Processes, Serial
+from inercal.foundation.computing.cluster import LOCAL, Cluster
+from inercal.foundation.computing.executors import Executor, Processes, Serial
 from inercal.laboratory.fleet.batch import batch
 from inercal.systems.selfcal.monte_carlo import campaign
 

@@ -16,9 +16,9 @@ from campaigns.noise import MIXES, one_recording
 from campaigns.places import add_options, in_words, place_of, progress
 from scipy import stats
 
-from inercal.foundation.estimate.result import coverage_factor
-from inercal.foundation.estimate.runs import run
+from inercal.foundation.computing.runs import run
 from inercal.foundation.instruments.noise import SYMBOLS
+from inercal.foundation.results.result import coverage_factor
 
 SEED, LEVEL = 20261121, 0.95
 

@@ -60,7 +60,7 @@ def case(name, number):
 def read(name, path, folder):
     """Columns by name and codes of findings of a file, as inercal reads it."""
     if name.startswith("result"):
-        from inercal.foundation.estimate.files import load
+        from inercal.foundation.results.files import load
 
         return {"values": load(path).values}, set()
     if name.startswith("xml"):
@@ -68,7 +68,7 @@ def read(name, path, folder):
 
         return {"values": estimate_of_certificate(path).values}, set()
     if name == "checkpoint":
-        from inercal.foundation.estimate.checkpoint import load as load_state
+        from inercal.foundation.computing.checkpoint import load as load_state
 
         like = {"x": np.zeros(1), "n": 0}
         state = load_state(path, "test", "same", like)

@@ -21,10 +21,10 @@ from inercal.faces.studies.load import load_strapdown_study
 from inercal.faces.validate.strapdown import errors_over_u
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
-from inercal.systems.strapdown.batch import fit
-from inercal.systems.strapdown.error_state import filtered
+from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.error_state import filtered
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
 from inercal.systems.strapdown.reading import samples_of
-from inercal.systems.strapdown.rests import found_rests, nodes_of
 
 RECORD = str(FOLDER / "strapdown.bin.gz")
 WORDS = ("calibrate", "strapdown", RECORD, "--map", str(FOLDER / "strapdown-map.toml"), "--study",

@@ -203,11 +203,7 @@ WITHIN = {
         "limits identified rest recording rows turns settings second_order simulate multiposition means known_rates "
         "known_turns ferraris aided temperature task figures verbs system"
     ),
-    "strapdown": (
-        "limits coefficients settings kernels delay samples arrow simulate rests start batch error_state bounds "
-        "path_search design foresight left_out considered restricted averaged budget reading outcome task figures "
-        "verbs system"
-    ),
+    "strapdown": ("limits model settings simulate reading fit before noise result task figures verbs system"),
     "turntable": (
         "limits settings disturbances model weights second_order noise regression readings display sensitivity "
         "positions rate steps task figures verbs system"
@@ -508,7 +504,7 @@ def test_kinds_of_study_are_named_by_their_systems():
     known = {
         "inercal.cli.tree",  # the text of help
         "inercal.examples",  # their names and commands
-        "inercal.foundation.estimate.shown",  # on a floor below the systems
+        "inercal.foundation.results.shown",  # on a floor below the systems
         "inercal.faces.validate.case",  # names of examples
     }
     tables = [

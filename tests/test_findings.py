@@ -10,8 +10,8 @@ from inercal.bench.workbench.advice import Advice, advice_of
 from inercal.cli.options import Output, ReportOutput
 from inercal.cli.outcome import say_findings
 from inercal.faces.report.html import render
-from inercal.foundation.estimate.result import without_coefficients
 from inercal.foundation.findings import EVERYTHING, Finding, most_harmful, with_alternatives
+from inercal.foundation.results.result import without_coefficients
 
 WEAK = Finding(
     "weak_test",

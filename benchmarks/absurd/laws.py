@@ -6,9 +6,9 @@ import math
 import numpy as np
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import to_json
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.files import to_json
+from inercal.foundation.results.result import Estimate
 
 FAR = 1000.0
 """Standard uncertainties by which the result of a run that obeys its study must not be off, where it is called ok."""

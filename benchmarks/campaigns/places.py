@@ -16,9 +16,9 @@ from typing import Any
 from inercal import __version__
 from inercal.cli.options import CheckpointOption, ClusterOption, WorkersOption, count_of
 from inercal.foundation._files import write_text
+from inercal.foundation.computing.cluster import place
+from inercal.foundation.computing.executors import Executor, computed, divided
 from inercal.foundation.errors import InercalError, InputError
-from inercal.foundation.estimate.cluster import place
-from inercal.foundation.estimate.executors import Executor, computed, divided
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

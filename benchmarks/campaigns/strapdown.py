@@ -11,10 +11,10 @@ sys.path.append(str(Path(__file__).parents[2] / "tests" / "strapdown"))
 import numpy as np
 from grades import GRADES, drawn
 
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.record import record_of
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
-from inercal.systems.strapdown.coefficients import stated
+from inercal.systems.strapdown.model.coefficients import stated
 from inercal.systems.strapdown.settings import ESTIMABLE, StrapdownSettings
 from inercal.systems.strapdown.simulate import simulated
 from inercal.systems.strapdown.task import calibrate

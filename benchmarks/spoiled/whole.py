@@ -194,9 +194,9 @@ def bag(kind):
 
 def estimate():
     """A result with a covariance."""
-    from inercal.foundation.estimate.basis import Basis
-    from inercal.foundation.estimate.result import Estimate
     from inercal.foundation.findings import Status
+    from inercal.foundation.results.basis import Basis
+    from inercal.foundation.results.result import Estimate
 
     none = Estimate.without(Basis("test"), Status.OK, "sound")
     from dataclasses import replace
@@ -210,7 +210,7 @@ def estimate():
 
 def result(suffix):
     """A result as a file."""
-    from inercal.foundation.estimate.files import save
+    from inercal.foundation.results.files import save
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, f"a{suffix}")
@@ -244,7 +244,7 @@ def certificate():
 
 def checkpoint():
     """The state of a stream."""
-    from inercal.foundation.estimate.checkpoint import save
+    from inercal.foundation.computing.checkpoint import save
 
     with tempfile.TemporaryDirectory() as folder:
         save(Path(folder, "a"), "test", "same", {"x": VALUES["acc_x"], "n": 3})

@@ -47,7 +47,7 @@ Records: labelled columns (`inercal.foundation.records.record.Record`)
 
 Uncertainty
     u standard, U = k u expanded for 95.45 % (k from Student's t), type A from scatter, type B from elsewhere;
-    an `inercal.foundation.estimate.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
+    an `inercal.foundation.results.result.Estimate` carries values, covariance, degrees of freedom, status and budget.
 
 Map, lower floors first; each imports only from those above its own line
     foundation: what all share
@@ -59,9 +59,10 @@ Map, lower floors first; each imports only from those above its own line
     instruments                terms, triad, polynomial, by_angle, noise
     records                    record, column, channels, maps, read, write, checks, dwells
     rigs                       chain, distribution, tables, plans, outputs
-    estimate                   result, budget, runs, coverage, files, repeat, compare, effects,
-                               checkpoint, consistency, identifiability, hypotheses, variances, remarks; kernels:
-                               factor, sigma_point, kalman
+    computing                  runs, executors, cluster, checkpoint
+    inference                  least_squares, variances, consistency, coverage, identifiability, hypotheses, effects;
+                               kernels: factor, sigma_point, kalman
+    results                    result, basis, budget, files, remarks, repeat, compare, formula, table
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
     designs                    candidates, criteria, exchange, search, comparison
@@ -71,8 +72,8 @@ Map, lower floors first; each imports only from those above its own line
     systems: contract (what a system offers), listed (all of them), and a room for each
     imu                        multiposition (poses, accelerometer, turns, gyro), means, known_rates, known_turns,
                                ferraris, aided, temperature, task
-    strapdown                  coefficients, kernels, samples, rests, batch, error_state, restricted, averaged,
-                               left_out, considered, bounds, design, simulate, task
+    strapdown                  model (coefficients, samples, kernels), fit (rests, batch, error_state), before (bounds,
+                               design), noise (restricted, left_out, considered), result, simulate, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task
     selfcal                    platform (rig, plan, model), filters (error_state, quaternion, gimbal, batch),
                                before (bounds, observability, path_design, simulate), diagnosis, result, task
@@ -116,8 +117,8 @@ if TYPE_CHECKING:
     from inercal.faces.python.verbs import temperature as temperature
     from inercal.foundation.errors import CalibrationError as CalibrationError
     from inercal.foundation.errors import InputError as InputError
-    from inercal.foundation.estimate.result import Estimate as Estimate
     from inercal.foundation.records.record import Record as Record
+    from inercal.foundation.results.result import Estimate as Estimate
     from inercal.laboratory.fleet.batch import batch as batch
     from inercal.laboratory.verbs import history as history
     from inercal.laboratory.verbs import keep as keep
@@ -135,8 +136,8 @@ _WHERE = {
         "faces.python.study": ("Study", "study"),
         "faces.python.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
         "foundation.errors": ("CalibrationError", "InputError"),
-        "foundation.estimate.result": ("Estimate",),
         "foundation.records.record": ("Record",),
+        "foundation.results.result": ("Estimate",),
         "laboratory.fleet.batch": ("batch",),
         "laboratory.verbs": ("history", "keep"),
     }.items()

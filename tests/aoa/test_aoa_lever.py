@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sting_study import DEG, NOISE, G, layout, study
 
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.kalman import empty_row
+from inercal.foundation.inference.kalman import empty_row
 from inercal.foundation.units import parse_quantity
 from inercal.systems.aoa.fusion import model
 from inercal.systems.aoa.fusion.problem import problem

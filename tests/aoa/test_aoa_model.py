@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from sting_study import DEG, G, study
 
-from inercal.foundation.estimate.kalman import empty_row
+from inercal.foundation.inference.kalman import empty_row
 from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.fusion import model
 from inercal.systems.aoa.fusion.problem import problem

@@ -8,7 +8,7 @@ import pytest
 from sting_study import BASE, DEG, G, clipped, scenario, study
 
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.kalman import empty_row
+from inercal.foundation.inference.kalman import empty_row
 from inercal.systems.aoa.disturbances import Disturbances
 from inercal.systems.aoa.fusion import loop, model
 from inercal.systems.aoa.fusion.filter_result import estimate

@@ -8,11 +8,11 @@ import pytest
 from sting_study import DEG, NOISE, G, study
 
 from inercal.foundation.errors import InputError, StudyError
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.files import save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.files import save
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.layout import Layout

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from sting_study import DEG, G, study
 
-from inercal.foundation.estimate.files import save, to_json
 from inercal.foundation.instruments.terms import shown_unit, sized
+from inercal.foundation.results.files import save, to_json
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem

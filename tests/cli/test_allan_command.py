@@ -8,8 +8,8 @@ import pytest
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.faces.validate.noise import ALLANTOOLS, TAU
-from inercal.foundation.estimate.files import load
 from inercal.foundation.instruments.noise import NoiseModel
+from inercal.foundation.results.files import load
 from rows import for_each
 
 #: 0.1 deg/sqrt(h) and 50 ug/sqrt(Hz)

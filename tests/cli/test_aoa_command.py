@@ -15,7 +15,7 @@ from new_studies import FILL
 
 from inercal.cli import aoa as command
 from inercal.cli import run
-from inercal.foundation.estimate.files import load
+from inercal.foundation.results.files import load
 from inercal.systems.aoa import settings
 from rows import for_each
 

@@ -8,10 +8,10 @@ import pytest
 from inercal.cli import run
 from inercal.faces.convert.correct import ImuModel
 from inercal.faces.convert.other_tools import CONVENTIONS
-from inercal.foundation.estimate.files import load, save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.triad import TriadModel
+from inercal.foundation.results.files import load, save
+from inercal.foundation.results.result import Estimate
 from rows import for_each
 
 NAMES = (

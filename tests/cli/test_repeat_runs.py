@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.foundation.estimate.files import load
 from inercal.foundation.records.write import write_record
+from inercal.foundation.results.files import load
 from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 
 

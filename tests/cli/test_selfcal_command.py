@@ -17,7 +17,7 @@ from paper_study import TRUTH
 
 from inercal.cli import run
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.foundation.estimate.files import load
+from inercal.foundation.results.files import load
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from rows import for_each

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from inercal.faces.convert.correct import ImuModel
 from inercal.faces.convert.other_tools import CONVENTIONS
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.triad import TriadModel
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 
 seeds = st.integers(0, 2**32 - 1)

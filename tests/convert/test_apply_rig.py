@@ -10,11 +10,11 @@ from inercal.cli import run
 from inercal.faces.convert.correction import apply_to
 from inercal.faces.convert.platform import not_applied, platform_model
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.records.record import record_of
 from inercal.foundation.records.write import write_record
+from inercal.foundation.results.files import save
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.platform.coefficients import NAMES, units
 from inercal.systems.selfcal.platform.states import ALL

@@ -13,13 +13,13 @@ from inercal.cli import run
 from inercal.faces.convert.correction import apply_to
 from inercal.faces.convert.platform import not_applied, platform_model
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record
 from inercal.foundation.records.write import write_record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.platform.coefficients import names, to_linear, units
@@ -157,7 +157,7 @@ def test_what_is_not_applied_is_said():
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A calibration and a record of the paper's path with missing values, here."""
-    from inercal.foundation.estimate.files import save
+    from inercal.foundation.results.files import save
     from inercal.systems.selfcal.before.simulate import to_record
 
     monkeypatch.chdir(tmp_path)

@@ -16,12 +16,12 @@ from inercal.faces.convert.correction import apply_to
 from inercal.faces.convert.models import model_of, worth_knowing
 from inercal.faces.convert.table import TableInstrument
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
 from inercal.foundation.records.read import read
 from inercal.foundation.records.record import record_of
 from inercal.foundation.records.write import write_record
+from inercal.foundation.results.files import save
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.settings import RateTest

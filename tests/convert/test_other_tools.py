@@ -11,8 +11,8 @@ from inercal.faces.convert.convention import flat, in_si_outputs
 from inercal.faces.convert.correct import imu_model
 from inercal.faces.convert.other_tools import CONVENTIONS, from_tool, to_tool
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import load, save
 from inercal.foundation.findings import Finding
+from inercal.foundation.results.files import load, save
 
 
 @pytest.mark.parametrize("name", CONVENTIONS)

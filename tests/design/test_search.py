@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from inercal.foundation.computing.executors import Threads
 from inercal.foundation.designs.search import from_starts, improved
-from inercal.foundation.estimate.executors import Threads
 
 
 @dataclass

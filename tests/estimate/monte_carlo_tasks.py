@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from inercal.foundation.computing.executors import Processes, Serial
+from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.executors import Processes, Serial
-from inercal.foundation.estimate.runs import run
 
 
 def line_fit(rng):

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.foundation.estimate.budget import TypeA, TypeB, combine
-from inercal.foundation.estimate.least_squares import least_squares
-from inercal.foundation.estimate.result import coverage_factor
 from inercal.foundation.geometry.earth import gravity, gravity_gradient
+from inercal.foundation.inference.least_squares import least_squares
+from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.result import coverage_factor
 
 
 def scalar(source, u, dof=np.inf):

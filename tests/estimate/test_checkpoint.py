@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
+from inercal.foundation.computing.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.checkpoint import alone, fingerprint, load, save
 
 
 class Inner(NamedTuple):

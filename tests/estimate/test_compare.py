@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.compare import FAMILY, Saved, compare
-from inercal.foundation.estimate.files import load, save
-from inercal.foundation.estimate.result import Estimate, coverage_factor
 from inercal.foundation.findings import Status
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.compare import FAMILY, Saved, compare
+from inercal.foundation.results.files import load, save
+from inercal.foundation.results.result import Estimate, coverage_factor
 
 SITE = {"site": {"gravity_m_s2": 9.81, "latitude_rad": None}}
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.foundation.estimate.consistency import nis, slow_power, surprising, whiteness
+from inercal.foundation.inference.consistency import nis, slow_power, surprising, whiteness
 
 DIMS = 6
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from inercal.foundation.estimate.effects import joint_second_moment, second_moment
+from inercal.foundation.inference.effects import joint_second_moment, second_moment
 
 
 def test_the_second_moment_is_that_of_a_weighted_sample():

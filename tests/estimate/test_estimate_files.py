@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.files import from_json, load, plain_objects, save, to_json
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import CODES, Finding, Harm, Status
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.files import from_json, load, plain_objects, save, to_json
+from inercal.foundation.results.result import Estimate
 from rows import for_each
 
 

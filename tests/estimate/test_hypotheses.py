@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from inercal.foundation.estimate import hypotheses
-from inercal.foundation.estimate.hypotheses import (
+from inercal.foundation.inference import hypotheses
+from inercal.foundation.inference.hypotheses import (
     Hypothesis,
     least_squares,
     likeliest,

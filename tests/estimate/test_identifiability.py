@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.foundation.estimate.identifiability import identify, learned
+from inercal.foundation.inference.identifiability import identify, learned
 
 NAMES = ("a", "b", "c", "d")
 

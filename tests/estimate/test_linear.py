@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.faces.validate.foundation import LONGLEY, LONGLEY_CERTIFIED, NORRIS, NORRIS_CERTIFIED
-from inercal.foundation.estimate.identifiability import identify, in_words
-from inercal.foundation.estimate.least_squares import least_squares, whiten
 from inercal.foundation.geometry.rotations import elementary
+from inercal.foundation.inference.identifiability import identify, in_words
+from inercal.foundation.inference.least_squares import least_squares, whiten
 from rows import for_each
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.faces.validate.foundation import MISRA1A, MISRA1A_CERTIFIED
-from inercal.foundation.estimate.least_squares import least_squares, solve
+from inercal.foundation.inference.least_squares import least_squares, solve
 from rows import for_each
 
 T = np.linspace(0.0, 2.0, 12)

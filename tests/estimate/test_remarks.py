@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from inercal.foundation.estimate.budget import TypeB, combine
-from inercal.foundation.estimate.identifiability import learned
-from inercal.foundation.estimate.remarks import (
+from inercal.foundation.findings import Status
+from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.inference.identifiability import learned
+from inercal.foundation.results.budget import TypeB, combine
+from inercal.foundation.results.remarks import (
     at_prior,
     at_prior_together,
     exact_gravity,
@@ -14,8 +16,6 @@ from inercal.foundation.estimate.remarks import (
     ruled_by_site,
     singular,
 )
-from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
 
 
 def texts(findings):

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.files import from_json, to_json
-from inercal.foundation.estimate.repeat import combine_runs, mandel_paule
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.files import from_json, to_json
+from inercal.foundation.results.repeat import combine_runs, mandel_paule
+from inercal.foundation.results.result import Estimate
 
 
 def run_of(values, own, elsewhere=None, dof=30.0, **more) -> Estimate:

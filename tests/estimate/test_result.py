@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from inercal.foundation.errors import CalibrationError
-from inercal.foundation.estimate.result import Estimate, Parameter, coverage_factor
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.findings import Status
+from inercal.foundation.results.result import Estimate, Parameter, coverage_factor
+from inercal.foundation.results.rounding import rounded
 from rows import for_each
 
 

@@ -14,9 +14,9 @@ import monte_carlo_tasks as tasks
 import numpy as np
 import pytest
 
+from inercal.foundation.computing.executors import Processes, Serial, Threads
+from inercal.foundation.computing.runs import RunError, generator, run
 from inercal.foundation.errors import InercalError, InputError
-from inercal.foundation.estimate.executors import Processes, Serial, Threads
-from inercal.foundation.estimate.runs import RunError, generator, run
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.foundation.estimate.factor import CHOLESKY, EIGEN, FACTORS, root
-from inercal.foundation.estimate.sigma_point import (
+from inercal.foundation.inference.factor import CHOLESKY, EIGEN, FACTORS, root
+from inercal.foundation.inference.sigma_point import (
     covariance,
     cross,
     draw,

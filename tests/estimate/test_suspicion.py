@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import inercal
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.files import from_json, to_json
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm, Status, causes, settled
 from inercal.foundation.instruments.terms import resting_on
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.files import from_json, to_json
+from inercal.foundation.results.result import Estimate
 from rows import for_each
 
 NAMES = ("K0_x", "D_F_x", "S_x")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.foundation.estimate.variances import Score, degrees, highest, second_moment, solved, weighed
+from inercal.foundation.inference.variances import Score, degrees, highest, second_moment, solved, weighed
 
 
 def dense(A, y, V):

@@ -16,8 +16,8 @@ from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.platform.kinematics import attitude
 from inercal.systems.selfcal.platform.plan import motion
-from inercal.systems.strapdown.bounds import Pieces
-from inercal.systems.strapdown.bounds import bounds as turn_bounds
+from inercal.systems.strapdown.before.bounds import Pieces
+from inercal.systems.strapdown.before.bounds import bounds as turn_bounds
 from inercal.systems.turntable.model import channels_of
 from inercal.systems.turntable.positions.fit import choose_terms
 from inercal.systems.turntable.positions.planning import design

@@ -15,9 +15,9 @@ from independent.fleet import made
 from test_fleet import seconds, told
 
 import inercal as ic
+from inercal.foundation.computing.cluster import ChunkLostError, Cluster
+from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InercalError, InputError
-from inercal.foundation.estimate.cluster import ChunkLostError, Cluster
-from inercal.foundation.estimate.runs import run
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals as on POSIX")
@@ -215,7 +215,7 @@ def test_a_scheduler_that_is_killed_ends_the_command_which_goes_on_later(tmp_pat
 
 @pytest.mark.slow
 def test_no_worker_is_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr("inercal.foundation.estimate.cluster._PATIENCE", 2.0)
+    monkeypatch.setattr("inercal.foundation.computing.cluster._PATIENCE", 2.0)
     with cluster(tmp_path, 0) as (file, _, _), pytest.raises(InputError, match="found no worker"):
         run(noise, runs=1, seed=SEED, executor=Cluster(file))
 
@@ -227,7 +227,7 @@ def test_no_scheduler_is_one_sentence(tmp_path):
 
 @pytest.mark.slow
 def test_workers_of_another_program_are_refused(quiet, monkeypatch):
-    monkeypatch.setattr("inercal.foundation.estimate.cluster.program", lambda: "0" * 64)
+    monkeypatch.setattr("inercal.foundation.computing.cluster.program", lambda: "0" * 64)
     with pytest.raises(InputError, match="another program"):
         run(noise, runs=1, seed=SEED, executor=Cluster(quiet))
 

@@ -20,9 +20,9 @@ from independent.fleet import made
 
 import inercal as ic
 from inercal.cli import run
+from inercal.foundation.computing.cluster import ChunkLostError, Cluster
+from inercal.foundation.computing.executors import Processes
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.cluster import ChunkLostError, Cluster
-from inercal.foundation.estimate.executors import Processes
 from inercal.laboratory.fleet.batch import _chunks, _rows
 from inercal.laboratory.fleet.manifest import Unit, read_manifest
 from inercal.laboratory.fleet.unit import Batch, content_of, row_of, row_path

@@ -10,8 +10,8 @@ import inercal as ic
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.faces.python.study import read_study
-from inercal.foundation.estimate.cluster import Cluster
-from inercal.foundation.estimate.executors import Processes, Threads, numbered
+from inercal.foundation.computing.cluster import Cluster
+from inercal.foundation.computing.executors import Processes, Threads, numbered
 from inercal.systems.selfcal import verbs as selfcal
 from inercal.systems.turntable import verbs as turntable
 

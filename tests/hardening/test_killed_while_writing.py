@@ -28,9 +28,9 @@ from new_studies import FILL
 from inercal.cli import main, run
 from inercal.cli.tree import COMMANDS as TREE
 from inercal.examples import EXAMPLES, FOLDER
-from inercal.foundation.estimate.executors import Serial
-from inercal.foundation.estimate.files import save
+from inercal.foundation.computing.executors import Serial
 from inercal.foundation.records.read import read
+from inercal.foundation.results.files import save
 from inercal.laboratory.catalog import results
 from inercal.laboratory.store import open_store
 
@@ -411,7 +411,7 @@ def test_a_stream_killed_while_it_saves_goes_on_with_the_same_digits(
     saves = []
 
     def at_the_third() -> None:
-        import inercal.foundation.estimate.checkpoint as checkpoint
+        import inercal.foundation.computing.checkpoint as checkpoint
 
         write = checkpoint.write_bytes
         signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # here: a live source saves in another thread

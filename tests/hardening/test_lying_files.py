@@ -404,7 +404,7 @@ def test_a_new_python_imports_nothing_beside_a_recording(tmp_path, monkeypatch):
 
 _POOL = """
 from inercal import cli
-from inercal.foundation.estimate.executors import Processes
+from inercal.foundation.computing.executors import Processes
 
 def run(arguments):
     print(sorted(found for _, found in Processes(1).map(len, [range(2), range(3)])))

@@ -12,7 +12,7 @@ import pytest
 from made import ITEM, result
 
 from inercal.cli import run
-from inercal.foundation.estimate.files import save
+from inercal.foundation.results.files import save
 from inercal.laboratory.check import check
 from inercal.laboratory.keep import keep
 from inercal.laboratory.store import make_store, open_store

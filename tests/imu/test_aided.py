@@ -13,11 +13,11 @@ from campaigns.aided import LATITUDE, PROGRAM, draw_truth, one_calibration
 from inercal.faces.report.html import render
 from inercal.faces.studies.imu import AidedTable, aided_settings
 from inercal.foundation._toml import check
+from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.estimate.coverage import coverage
-from inercal.foundation.estimate.runs import run
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.site import Site
+from inercal.foundation.inference.coverage import coverage
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.rigs.distribution import normal

@@ -11,8 +11,8 @@ import pytest
 from campaigns.imu import one_calibration
 from scipy.stats import binom
 
-from inercal.foundation.estimate.coverage import coverage
-from inercal.foundation.estimate.runs import run
+from inercal.foundation.computing.runs import run
+from inercal.foundation.inference.coverage import coverage
 
 SEED = 20261121
 RUNS = 250

@@ -9,12 +9,12 @@ from scipy.signal import lfilter
 
 from inercal.cli import run
 from inercal.foundation.errors import InputError, RecordError
-from inercal.foundation.estimate.files import load, save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.files import load, save
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.temperature.calibrations import fit_calibrations
 from inercal.systems.imu.temperature.cubic import fit_points, fit_sweep

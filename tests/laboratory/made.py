@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.keep import Item
 
 ITEM = Item("Maker", "Model", "17", "Owner", "gyro")

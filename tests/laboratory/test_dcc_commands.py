@@ -9,7 +9,7 @@ from certified import LAB
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.foundation.estimate.files import load
+from inercal.foundation.results.files import load
 from rows import for_each
 
 #: kind -> options of the simulation, and the command that calibrates
@@ -127,7 +127,7 @@ def minimal():
     """The JSON of a result that is ok."""
     from made import result
 
-    from inercal.foundation.estimate.files import to_json
+    from inercal.foundation.results.files import to_json
 
     return json.dumps(to_json(result())).encode()
 

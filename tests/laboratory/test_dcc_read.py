@@ -15,7 +15,7 @@ from made import result as made
 
 import inercal as ic
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save, to_json
+from inercal.foundation.results.files import save, to_json
 from inercal.laboratory.certificate.elements import NAMESPACES
 from inercal.laboratory.certificate.page import page
 from inercal.laboratory.certificate.parsing import parsed

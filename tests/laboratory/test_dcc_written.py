@@ -11,9 +11,9 @@ from made import result as made
 from scipy import stats
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.budget import BudgetItem
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.dsi import dsi
+from inercal.foundation.results.budget import BudgetItem
 from inercal.laboratory.certificate.elements import NAMESPACES, factor, plain
 from inercal.laboratory.certificate.lab import LabFile, lab_template, read_lab
 from inercal.laboratory.certificate.page import page

@@ -12,8 +12,8 @@ from made import result
 import inercal as ic
 from inercal.cli import run
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save
 from inercal.foundation.findings import Status
+from inercal.foundation.results.files import save
 from inercal.laboratory.catalog import values_of
 from inercal.laboratory.history import history
 from inercal.laboratory.keep import Item, keep

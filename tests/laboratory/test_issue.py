@@ -11,7 +11,7 @@ from sqlalchemy import text
 from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save
+from inercal.foundation.results.files import save
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import show
 from inercal.laboratory.check import check

@@ -14,8 +14,8 @@ from sqlalchemy import select, text
 
 from inercal.cli import run
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import save
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.files import save
 from inercal.laboratory import keep as keeping
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import instruments, results, show, values_of
@@ -40,7 +40,7 @@ STORE = f"postgresql://lab:{SECRET}@host/db"
 def secrets_of_old(monkeypatch):
     """What 0.2.0 did with secrets: nothing."""
     for module in (
-        "foundation.estimate.files",
+        "foundation.results.files",
         "laboratory.keep",
         "laboratory.supersede",
         "laboratory.certificate.written",

@@ -19,8 +19,8 @@ from made import ITEM, result
 from sqlalchemy import text
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import to_json
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.files import to_json
 from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import find, instruments, results, show, values_of
 from inercal.laboratory.check import check

@@ -376,7 +376,7 @@ def test_a_result_that_names_a_device_or_a_pipe_is_not_waited_for(path, lab, cap
 
 def test_files_that_a_study_and_a_map_name_by_absolute_paths_are_those_kept(lab, tmp_path, capsys):
     """A study, a map and an option with absolute names, all files gone: the rerun reads what was kept."""
-    from inercal.foundation.estimate.files import load
+    from inercal.foundation.results.files import load
 
     far = tmp_path / "far away"
     far.mkdir()

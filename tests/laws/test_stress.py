@@ -11,9 +11,9 @@ import pytest
 import stress
 from absurd import laws
 
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.result import Estimate
 
 RUNS, PARTS = 500, 8
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from inercal.foundation.errors import InputError, RecordError
-from inercal.foundation.estimate.files import load, save
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
@@ -14,6 +13,7 @@ from inercal.foundation.noise.outcome import noise_of
 from inercal.foundation.noise.rest import unrest
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.files import load, save
 from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
 
 RATE = 100.0

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from campaigns.noise import MIXES, one_recording
 
-from inercal.foundation.estimate.result import coverage_factor
-from inercal.foundation.estimate.runs import run
+from inercal.foundation.computing.runs import run
 from inercal.foundation.instruments.noise import SYMBOLS
+from inercal.foundation.results.result import coverage_factor
 
 SEED, RUNS = 20261121, 250
 

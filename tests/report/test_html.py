@@ -10,12 +10,12 @@ import pytest
 
 from inercal.faces.report.html import Picture, render
 from inercal.faces.report.style import plain_unit
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.files import from_json, to_json
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.terms import TERMS
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.files import from_json, to_json
+from inercal.foundation.results.result import Estimate
 
 VOID = {"meta", "img", "br", "col", "hr", "link", "input"}
 HOSTILE = "<script>alert(1)</script> \"><img src='http://evil.example/x' onerror=alert(2)> & {{ 7 * 7 }} $x$"

@@ -17,12 +17,12 @@ from inercal.faces.report.inspection import (
     sparkline,
     summary,
 )
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 
 SOURCE = Source("runs/a <b>.csv", "0f" * 32)

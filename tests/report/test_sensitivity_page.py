@@ -7,10 +7,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.site import Site
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.distribution import normal, uniform
 from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.foundation.rigs.tables import turntable

@@ -9,7 +9,7 @@ from independent.selfcal import ARCSEC, DEG_H, PPM, THREE, UG, Drive, Faults, G
 
 import inercal as ic
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.foundation.estimate.hypotheses import slopes
+from inercal.foundation.inference.hypotheses import slopes
 from inercal.foundation.records.read import read
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.diagnosis.fit_quality import JUDGE, filtered

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from paper_study import TRUTH, study
 
-from inercal.foundation.estimate.executors import Threads
+from inercal.foundation.computing.executors import Threads
 from inercal.systems.selfcal.monte_carlo import campaign
 
 SEED, FEW, RUNS = 20261121, 20, 100

@@ -16,11 +16,11 @@ from inercal.faces.report import innovations as filtering
 from inercal.faces.report.cells import Cell
 from inercal.faces.report.coefficients import dots
 from inercal.faces.report.courses import turning
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.budget import TypeA, combine
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.rotations import exp, multiply, normalize
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.budget import TypeA, combine
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.observability import observability

@@ -7,9 +7,9 @@ import numpy as np
 from inercal.foundation.geometry.earth import gravity
 from inercal.foundation.geometry.site import Site
 from inercal.foundation.units import parse_quantity
-from inercal.systems.strapdown.batch import fit
-from inercal.systems.strapdown.coefficients import SIZE, free_places
-from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
+from inercal.systems.strapdown.model.coefficients import SIZE, free_places
 from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Plan, Prior, Rests, StrapdownSettings
 from inercal.systems.strapdown.simulate import simulated
 

@@ -7,10 +7,10 @@ import pytest
 from grades import GRADES, MEMS, NAV, drawn, fitted, u_by_kind
 from scipy.stats import chi2, norm
 
-from inercal.systems.strapdown.averaged import opened
-from inercal.systems.strapdown.batch import fit
-from inercal.systems.strapdown.restricted import residuals, with_noise_shown
-from inercal.systems.strapdown.rests import found_rests, nodes_of
+from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
+from inercal.systems.strapdown.noise.averaged import opened
+from inercal.systems.strapdown.noise.restricted import residuals, with_noise_shown
 from inercal.systems.strapdown.settings import ESTIMABLE, Motion
 from inercal.systems.strapdown.simulate import simulated
 

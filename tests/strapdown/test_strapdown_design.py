@@ -12,10 +12,10 @@ import inercal as ic
 from inercal.cli import run
 from inercal.foundation.designs.search import improved
 from inercal.foundation.errors import InputError, StudyError
-from inercal.systems.strapdown.bounds import Pieces, bounds
-from inercal.systems.strapdown.coefficients import SIZE
-from inercal.systems.strapdown.design import NINETEEN, angles_of, by_kind, design
-from inercal.systems.strapdown.path_search import TurnGround, attitudes
+from inercal.systems.strapdown.before.bounds import Pieces, bounds
+from inercal.systems.strapdown.before.design import NINETEEN, angles_of, by_kind, design
+from inercal.systems.strapdown.before.path_search import TurnGround, attitudes
+from inercal.systems.strapdown.model.coefficients import SIZE
 from inercal.systems.strapdown.settings import Design, Goal, Plan
 from inercal.systems.strapdown.simulate import start_attitude
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from inercal.systems.strapdown.left_out import Candidate, Posed, told_apart
-from inercal.systems.strapdown.left_out import tests as left_out
+from inercal.systems.strapdown.noise.left_out import Candidate, Posed, told_apart
+from inercal.systems.strapdown.noise.left_out import tests as left_out
 
 ROWS, COEFFICIENTS = 400, 4
 SENSORS = {0: "one", 1: "other"}

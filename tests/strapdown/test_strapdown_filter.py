@@ -11,10 +11,10 @@ from grades import GRADES, drawn
 import inercal as ic
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.systems.strapdown.batch import fit
-from inercal.systems.strapdown.error_state import filtered, measured, predicted
+from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.error_state import filtered, measured, predicted
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
 from inercal.systems.strapdown.reading import evened
-from inercal.systems.strapdown.rests import found_rests, nodes_of
 from inercal.systems.strapdown.simulate import simulated
 
 

@@ -7,8 +7,10 @@ import pytest
 from grades import GRADES, MEMS, NAV, TACTICAL, drawn, plan
 
 from inercal.foundation.geometry.rotations import conjugate, exp, from_matrix, log, multiply
-from inercal.systems.strapdown.batch import empty_shot, fit, variances_of, world_of
-from inercal.systems.strapdown.coefficients import (
+from inercal.systems.strapdown.fit.batch import empty_shot, fit, variances_of, world_of
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
+from inercal.systems.strapdown.fit.start import beginning, carried_through
+from inercal.systems.strapdown.model.coefficients import (
     GRAVITY,
     KA,
     LATITUDE,
@@ -25,13 +27,11 @@ from inercal.systems.strapdown.coefficients import (
     slope,
     stated,
 )
-from inercal.systems.strapdown.delay import delayed
-from inercal.systems.strapdown.kernels import State, shoot
-from inercal.systems.strapdown.rests import found_rests, nodes_of
-from inercal.systems.strapdown.samples import Samples, freed, gains
+from inercal.systems.strapdown.model.delay import delayed
+from inercal.systems.strapdown.model.kernels import State, shoot
+from inercal.systems.strapdown.model.samples import Samples, freed, gains
 from inercal.systems.strapdown.settings import Motion
 from inercal.systems.strapdown.simulate import _turns, simulated, truth
-from inercal.systems.strapdown.start import beginning, carried_through
 
 SHORT = replace(
     TACTICAL,

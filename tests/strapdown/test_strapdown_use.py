@@ -26,7 +26,7 @@ def folder(tmp_path_factory):
     plan += ["--set", "plan.sample_rate=200 Hz", "--set", "motion.wobble=3 deg", "--set", TERMS]
     assert run(["new", "strapdown", "--out", study, "--quiet", *SITE, *plan]) == 0
     settings = ic.study(study, truth=TRUTH).settings
-    from inercal.systems.strapdown.coefficients import SIZE, array_of
+    from inercal.systems.strapdown.model.coefficients import SIZE, array_of
     from inercal.systems.strapdown.simulate import simulated, to_record
 
     pairs = (("run", array_of(settings.truth, "upper")), ("true", np.zeros(SIZE)))

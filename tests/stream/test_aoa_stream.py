@@ -12,11 +12,11 @@ from streams_that_break import lines_out
 from inercal.faces.stream.aoa import Aoa
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import Saving
+from inercal.foundation.computing.checkpoint import fingerprint
 from inercal.foundation.errors import InputError, RecordError, StudyError
-from inercal.foundation.estimate.checkpoint import fingerprint
-from inercal.foundation.estimate.files import save
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
+from inercal.foundation.results.files import save
 from inercal.foundation.units import parse_quantity, parse_unit
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.disturbances import Disturbances, Oscillation

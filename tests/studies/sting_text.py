@@ -8,9 +8,9 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from inercal.faces.studies.aoa import aoa_study
-from inercal.foundation.estimate.files import save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.files import save
+from inercal.foundation.results.result import Estimate
 
 # The study of the interface description, to the letter.
 CONTRACT = """

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from inercal.faces.studies.turntable import turntable_study
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.files import plain_objects
+from inercal.foundation.results.files import plain_objects
 from inercal.systems.turntable.sensitivity.analysis import analyse, result, table
 from inercal.systems.turntable.sensitivity.maps import write_maps
 

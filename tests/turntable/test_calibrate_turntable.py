@@ -20,10 +20,10 @@ from turntable_studies import (
 )
 
 from inercal.foundation.errors import CalibrationError, StudyError
-from inercal.foundation.estimate.files import from_json, to_json
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.site import GravityInput, Site
 from inercal.foundation.records.column import Column
+from inercal.foundation.results.files import from_json, to_json
 from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.foundation.units import parse_unit

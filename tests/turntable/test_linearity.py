@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.foundation.estimate.result import COVERAGE
 from inercal.foundation.geometry.site import Site
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import COVERAGE
 from inercal.foundation.rigs.plans import named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

@@ -8,10 +8,10 @@ from scipy import stats
 from turntable_studies import ARCMIN, DEG_H, LATITUDE, TUMBLE, WHEEL_X, references, study, wheel_output
 
 from inercal.cli import run
-from inercal.foundation.estimate.repeat import combine_runs
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.repeat import combine_runs
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

@@ -15,8 +15,8 @@ from inercal.faces.validate.gyrowheel import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
-from inercal.foundation.estimate.coverage import coverage, nees
-from inercal.foundation.estimate.runs import run
+from inercal.foundation.computing.runs import run
+from inercal.foundation.inference.coverage import coverage, nees
 
 SEED = 20261121
 RUNS = 250

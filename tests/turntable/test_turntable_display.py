@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from inercal.faces.studies.turntable import turntable_study
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.display import displayed, tolerances
 from inercal.systems.turntable.positions.outcome import unit_of_term

@@ -11,7 +11,7 @@ from inercal.cli import run as inercal
 from inercal.faces.validate import run
 from inercal.faces.validate.foundation import CASES
 from inercal.foundation._jit import source_hash
-from inercal.foundation.estimate.executors import Serial
+from inercal.foundation.computing.executors import Serial
 from inercal.foundation.geometry import earth
 
 

@@ -11,7 +11,7 @@ from inercal.faces.convert import other_tools
 from inercal.faces.validate import aoa, foundation, imu, noise, selfcal, strapdown, turntable
 from inercal.faces.validate.case import SOURCES, Case, Numbers, find, judge
 from inercal.faces.validate.run import SYSTEMS, cases_of, validate
-from inercal.foundation.estimate.executors import Serial
+from inercal.foundation.computing.executors import Serial
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry import earth, rotations
 from inercal.foundation.noise import deviation
@@ -198,7 +198,7 @@ def test_an_earth_that_turns_backward(monkeypatch, fresh):
 
 @pytest.mark.slow
 def test_an_earth_that_turns_backward_under_a_strapdown_unit(monkeypatch, fresh):
-    monkeypatch.setattr("inercal.systems.strapdown.batch.EARTH_RATE", -earth.EARTH_RATE)
+    monkeypatch.setattr("inercal.systems.strapdown.fit.batch.EARTH_RATE", -earth.EARTH_RATE)
     assert "rests-psins-truth" in red(strapdown.CASES, "rests-psins-truth")
 
 

@@ -172,8 +172,8 @@ def temperature(
 
 def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
     """The model of saved calibrations, in the order given."""
-    from inercal.foundation.estimate.files import load
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.files import load
     from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
     return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)

@@ -11,10 +11,10 @@ from cyclopts import Parameter
 from inercal.cli.options import FileOutput, StoreOption
 from inercal.cli.outcome import emit
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.table import aligned
+from inercal.foundation.results.table import aligned
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.laboratory.certificate.reading import Certificate
     from inercal.laboratory.store import Store
 
@@ -88,9 +88,9 @@ def _write(
     from datetime import UTC, datetime
 
     from inercal.foundation._files import read_bytes, write_bytes, write_text
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import certificate_of
@@ -152,7 +152,7 @@ def _store(given: str | None) -> Store | None:
 
 def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
     """A result of a file or of the store, and its report."""
-    from inercal.foundation.estimate.files import load
+    from inercal.foundation.results.files import load
 
     if Path(given).is_file() or store is None:
         return load(given), report
@@ -184,8 +184,8 @@ def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) ->
 def _read(path: Path, html: Path | None, output: FileOutput) -> None:
     """Print what a certificate states, and write it as a page where that is asked for."""
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import read_certificate
 

@@ -113,7 +113,7 @@ def design_strapdown(
     from inercal.foundation._files import write_text
     from inercal.foundation._jit import compiling
     from inercal.systems.strapdown import verbs as system
-    from inercal.systems.strapdown.design import study_table
+    from inercal.systems.strapdown.before.design import study_table
 
     output.check((".json", ".toml"), (study,))
     the_study, read_s = study_in("strapdown", study, overrides, output)

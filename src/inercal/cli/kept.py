@@ -12,7 +12,7 @@ from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit, say_findings
 from inercal.foundation.errors import InercalError, InputError
-from inercal.foundation.estimate.table import aligned
+from inercal.foundation.results.table import aligned
 
 if TYPE_CHECKING:
     import subprocess
@@ -33,9 +33,9 @@ def keep(
 ) -> None:
     """Keep a result that was made elsewhere."""
     from inercal.foundation._files import read_bytes
-    from inercal.foundation.estimate.files import load
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.files import load
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.keep import item_of, saved_in
     from inercal.laboratory.keep import keep as kept
@@ -59,8 +59,8 @@ def keep(
 
 def instruments(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
     """List the instruments of a store."""
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import instruments as listed
     from inercal.laboratory.store import open_store
 
@@ -84,9 +84,9 @@ def results(
     """List the results of a store."""
     from datetime import date
 
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.findings import Status
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import results as listed
     from inercal.laboratory.store import open_store
@@ -123,7 +123,7 @@ def show(
 ) -> None:
     """Show a result of a store."""
     from inercal.foundation._files import write_bytes
-    from inercal.foundation.estimate.files import save
+    from inercal.foundation.results.files import save
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown
     from inercal.laboratory.store import open_store
@@ -171,7 +171,7 @@ def supersede(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Say that a result takes the place of another."""
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.store import open_store
     from inercal.laboratory.supersede import supersede as superseded
@@ -195,9 +195,9 @@ def rerun(
     import tempfile
 
     from inercal.cli.stored_line import stored_line
-    from inercal.foundation.estimate.files import from_json
-    from inercal.foundation.estimate.result import without_coefficients
-    from inercal.foundation.estimate.rounding import rounded
+    from inercal.foundation.results.files import from_json
+    from inercal.foundation.results.result import without_coefficients
+    from inercal.foundation.results.rounding import rounded
     from inercal.laboratory.again import beside, laid_out, verdict
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown

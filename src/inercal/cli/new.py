@@ -85,7 +85,7 @@ def new_lab(
 ) -> None:
     """Write what a laboratory states in its certificates, to be filled in."""
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.lab import lab_template
 
     output.check((".toml",))
@@ -102,8 +102,8 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
     from inercal.faces.python.beginning import begun, mapped
     from inercal.faces.studies.starting import UNKNOWN
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.result import without_coefficients
     from inercal.foundation.units import parse_quantity
 
     output.check((".toml",), files)

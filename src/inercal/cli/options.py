@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cyclopts import Token
 
     from inercal.faces.python.study import Study as StudyOfFile
-    from inercal.foundation.estimate.executors import Executor
+    from inercal.foundation.computing.executors import Executor
     from inercal.foundation.findings import Finding
     from inercal.foundation.records.record import Record
 
@@ -320,7 +320,7 @@ def count_of(workers: int | None, cluster: str | None) -> int:
 
 def place_of(workers: int | None, cluster: str | None) -> Executor:
     """The place in which starts or positions are computed, by the two options; raises `InputError`."""
-    from inercal.foundation.estimate.cluster import place
+    from inercal.foundation.computing.cluster import place
 
     return place(1 if workers is None and cluster is None else count_of(workers, cluster), cluster)
 

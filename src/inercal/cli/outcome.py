@@ -12,8 +12,8 @@ from inercal.cli.options import Output, ReportOutput, ResultOutput
 
 if TYPE_CHECKING:
     from inercal.faces.python.result import Result
-    from inercal.foundation.estimate.result import Estimate
     from inercal.foundation.findings import Finding
+    from inercal.foundation.results.result import Estimate
 
 WHOLE = (".json", ".toml")
 """Suffixes of a file that holds the whole result."""
@@ -40,7 +40,7 @@ def say_findings(findings: Iterable[Finding], output: Output) -> None:
 
 def emit(estimate: Estimate, text: str, output: Output) -> None:
     """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
-    from inercal.foundation.estimate.files import to_json
+    from inercal.foundation.results.files import to_json
 
     output.emit(to_json(timed(estimate)) if output.json else {}, text)
 
@@ -60,8 +60,8 @@ def hand_over(
     suffix is not one of ``whole``.
     """
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.files import save
     from inercal.foundation.findings import Status
+    from inercal.foundation.results.files import save
 
     estimate = timed(estimate)
     estimate = replace(estimate, provenance={**estimate.provenance, "arguments": command_line()})

@@ -23,7 +23,7 @@ def examples(
 
     from inercal.examples import EXAMPLES, FOLDER, shipped
     from inercal.foundation._files import read_bytes, write_bytes
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
 
     if name is None:
         if output.out is not None:
@@ -91,7 +91,7 @@ def completion(
 ) -> None:
     """Print the script by which a shell completes commands."""
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
 
     output.check(())
     text = script(shell)

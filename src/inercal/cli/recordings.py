@@ -28,9 +28,9 @@ def inspect(
         summary,
     )
     from inercal.foundation._files import write_text
-    from inercal.foundation.estimate.files import save
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.files import save
+    from inercal.foundation.results.result import without_coefficients
 
     output.check(WHOLE, (*files, map_file))
     record = read_record(files, map_file, output, span)

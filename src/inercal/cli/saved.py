@@ -18,8 +18,8 @@ from inercal.foundation.errors import InputError
 if TYPE_CHECKING:
     from inercal.faces.convert.correction import Model
     from inercal.faces.convert.other_tools import Converted
-    from inercal.foundation.estimate.result import Estimate
     from inercal.foundation.findings import Finding
+    from inercal.foundation.results.result import Estimate
 
 
 def apply(
@@ -62,9 +62,9 @@ def apply(
 
     from inercal.faces.convert.correction import apply_to
     from inercal.faces.python.calibrations import worth_saying
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.read import source_of
     from inercal.foundation.records.write import SUFFIXES, write_record
+    from inercal.foundation.results.result import without_coefficients
 
     paths = recorded("apply", files, streaming)
     if output.out is None:
@@ -107,9 +107,9 @@ def compare(
 ) -> int:
     """Compare two calibrations of one instrument."""
     from inercal.faces.python.calibrations import of_comparison, read_estimate
-    from inercal.foundation.estimate.compare import Saved
-    from inercal.foundation.estimate.compare import compare as compared
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.compare import Saved
+    from inercal.foundation.results.compare import compare as compared
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
@@ -144,9 +144,9 @@ def convert(
 ) -> int:
     """Convert a calibration to or from another tool's."""
     from inercal.faces.convert.other_tools import CONVENTIONS, from_tool, to_tool
-    from inercal.foundation.estimate.files import load
     from inercal.foundation.findings import Status
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.files import load
 
     if to is None and source is None:
         raise InputError("--to", "missing, expected --to or --from and one of " + ", ".join(CONVENTIONS))
@@ -174,7 +174,7 @@ def convert(
 
 def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     """The calibration, to its file and as a table."""
-    from inercal.foundation.estimate.files import save
+    from inercal.foundation.results.files import save
 
     for finding in estimate.findings:  # all: what was not held is among them
         output.say_finding(finding)

@@ -127,11 +127,11 @@ def _campaign(
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
     from inercal.faces.python.study import read_study
     from inercal.foundation._jit import compiling
-    from inercal.foundation.estimate.cluster import Cluster
-    from inercal.foundation.estimate.executors import Threads
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.computing.cluster import Cluster
+    from inercal.foundation.computing.executors import Threads
     from inercal.foundation.findings import Status
     from inercal.foundation.records.read import source_of
+    from inercal.foundation.results.result import without_coefficients
     from inercal.systems.selfcal.filters.problem import problem
     from inercal.systems.selfcal.filters.run import load_kernels
     from inercal.systems.selfcal.monte_carlo import REFERENCES, campaign
@@ -195,9 +195,9 @@ def _simulated(
 
     from inercal.faces.python.study import read_study
     from inercal.faces.python.verbs import simulate
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.read import source_of
     from inercal.foundation.records.write import write_record
+    from inercal.foundation.results.result import without_coefficients
 
     _check(study, seed, output)
     assert output.out is not None

@@ -21,7 +21,7 @@ def store_init(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Make an empty store."""
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.store import make_store
 
     made = make_store(store, objects)
@@ -35,7 +35,7 @@ def store_init(
 
 def store_upgrade(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
     """Bring a store to the version of this inercal."""
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.store import upgrade_store
 
     opened, before, after = upgrade_store(store)
@@ -48,8 +48,8 @@ def store_upgrade(*, store: StoreOption = None, output: Output = Output()) -> No
 
 def store_check(*, store: StoreOption = None, output: Output = Output()) -> int:  # noqa: B008  (frozen)
     """Check chain, rows, objects and foreign keys of a store."""
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.check import check
     from inercal.laboratory.store import open_store
 
@@ -68,8 +68,8 @@ def store_check(*, store: StoreOption = None, output: Output = Output()) -> int:
 
 def store_scrub(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
     """Take secrets of addresses out of a store of inercal 0.2.0 or earlier."""
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.scrub import scrub
     from inercal.laboratory.store import open_store
@@ -99,7 +99,7 @@ def store_export(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Copy a store into a folder, which is a store itself."""
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.carry import export_store
     from inercal.laboratory.store import open_store
 
@@ -117,8 +117,8 @@ def store_import(
     output: Output = Output(),  # noqa: B008  (frozen)
 ) -> None:
     """Add the results of another store."""
-    from inercal.foundation.estimate.result import without_coefficients
     from inercal.foundation.records.places import counted
+    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.carry import import_store
     from inercal.laboratory.store import open_store
 

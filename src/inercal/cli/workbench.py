@@ -41,8 +41,8 @@ def workbench(
 
     from inercal.bench.workbench.bench import open_bench
     from inercal.bench.workbench.serve import HERE, Door, serve
-    from inercal.foundation.estimate.files import to_json
-    from inercal.foundation.estimate.result import without_coefficients
+    from inercal.foundation.results.files import to_json
+    from inercal.foundation.results.result import without_coefficients
 
     if not 0 <= port <= 65535:
         raise InputError("--port", f"found {port}, expected a number from 0 to 65535")

@@ -8,7 +8,7 @@ InercalError
  │    └── QuantityError    a text that is not a quantity of the expected kind
  ├── UsageError            a command line that is wrong in itself
  ├── MissingExtraError     an optional package is not installed
- ├── RunError              a run of a Monte Carlo that failed (`inercal.foundation.estimate.runs`)
+ ├── RunError              a run of a Monte Carlo that failed (`inercal.foundation.computing.runs`)
  └── CalibrationError      an estimate whose status is not ``ok`` (``raise_for_status``)
 
 Every message is one sentence: where, what was found, what was expected. The command line turns an
@@ -23,7 +23,7 @@ from inercal.foundation.addresses import shown_address, without_secrets
 
 
 class Judged(Protocol):
-    """A result with a verdict: `inercal.foundation.estimate.result.Estimate`, which stands above this floor."""
+    """A result with a verdict: `inercal.foundation.results.result.Estimate`, which stands above this floor."""
 
     @property
     def status(self) -> Any:

@@ -11,7 +11,7 @@ from typing import Literal
 
 from inercal.foundation._files import read_bytes, write_bytes
 from inercal.foundation.errors import InputError, plain
-from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.catalog import Shown
 from inercal.laboratory.store import Store
 

@@ -10,8 +10,8 @@ from typing import Any
 from sqlalchemy import func, select
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import from_json
-from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.results.files import from_json
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.database import reading
 from inercal.laboratory.keep import Item
 from inercal.laboratory.store import Store

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.variances import solved, weighed
+from inercal.foundation.inference.variances import solved, weighed
 from inercal.laboratory.wander import Series, prior_of
 
 Mask: TypeAlias = NDArray[np.bool_]

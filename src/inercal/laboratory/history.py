@@ -11,10 +11,10 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.shown import units_shown
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted, counted_names
+from inercal.foundation.results.shown import units_shown
 from inercal.laboratory.chart import Chart, chart
 from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
 from inercal.laboratory.wander import Interval, Series, Wandering, wandering

@@ -15,13 +15,13 @@ from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Pane
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, QUIET
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.table import aligned
 from inercal.laboratory.chart import LIMIT, Mask
 from inercal.laboratory.history import HORIZON, REFERENCES, YEAR, Course, History
 from inercal.laboratory.specification import group_of

@@ -13,9 +13,9 @@ from sqlalchemy import Connection, insert, select
 
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import plain_objects, to_json
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.inputs import program
+from inercal.foundation.results.files import plain_objects, to_json
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import reading, writing
 from inercal.laboratory.store import Store

@@ -17,7 +17,7 @@ from sqlalchemy import Connection, Table, Text, delete, select, update
 
 from inercal.foundation.addresses import holds_secret, without_login, without_secrets
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import plain_objects
+from inercal.foundation.results.files import plain_objects
 from inercal.laboratory.chain import BEGIN, SCRUB, digest_of, happened, hash_of
 from inercal.laboratory.check import check, digests_of
 from inercal.laboratory.database import vacuum, writing

@@ -16,7 +16,7 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.units import parse_unit
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
 
 Verdict = Literal["conform", "not conform"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from inercal.faces.python.calibrations import estimate_of
 from inercal.faces.python.result import Result, View
 from inercal.foundation.errors import InputError, StudyError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.result import Estimate
 
 if TYPE_CHECKING:
     from inercal.laboratory.specification import Specification

@@ -7,7 +7,7 @@ The value x at time t, and what a calibration finds of it, are
 
 with c_k the part of u that all calibrations have in common (gravity, a table), v_k the rest of u, and e_k noise of
 variance s^2 beyond u (mounting, switching on). a and b have no prior: the likelihood of the variances q and s^2 is the
-restricted one (`inercal.foundation.estimate.variances`), and values are best linear unbiased predictions, as of a
+restricted one (`inercal.foundation.inference.variances`), and values are best linear unbiased predictions, as of a
 Kalman smoother with a diffuse start. On few points q and s^2 are hardly known. Hence they are not chosen but averaged
 over: on a grid, by their restricted likelihood times a prior density (1 + x)^-p of x, s or the random walk over the
 time that is covered, each in units of the median of u: below u all sizes are alike. With p = 5/3 intervals of simulated
@@ -28,8 +28,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import COVERAGE
-from inercal.foundation.estimate.variances import solved, weighed
+from inercal.foundation.inference.variances import solved, weighed
+from inercal.foundation.results.result import COVERAGE
 
 _GRID = 25
 """Sizes of each variance that are tried."""

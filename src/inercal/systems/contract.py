@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from inercal.foundation._toml import Strict
     from inercal.foundation.arrays import Array
     from inercal.foundation.designs.foresight import Foresight
-    from inercal.foundation.estimate.result import Estimate
     from inercal.foundation.records.record import Record
+    from inercal.foundation.results.result import Estimate
 
 Channels = Collection[str]
 """Names of the channels of a recording."""

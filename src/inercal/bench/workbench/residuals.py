@@ -23,7 +23,7 @@ class Part:
 
 
 def parts_of(result: Mapping[str, Any]) -> tuple[Part, ...]:
-    """The residuals in the command's part of a result (`inercal.foundation.estimate.result.Estimate`); none where it
+    """The residuals in the command's part of a result (`inercal.foundation.results.result.Estimate`); none where it
     has none."""
     found = [*_poses(result), *_turns(result), *_rests(result), *_unit_turns(result), *_points(result)]
     return tuple(part for part in found if part.rows)

@@ -11,11 +11,11 @@ from inercal.faces.convert.correction import Correction, Samples, factor_of, ran
 from inercal.faces.convert.motion import Placed, where_even
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.foundation.instruments.triad import TriadModel, apart, triad_from_terms
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 
 TERMS_IN_USE = (

@@ -11,11 +11,11 @@ import numpy as np
 from inercal.faces.convert.motion import interval
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import Unit, parse_unit
 
 Samples = Mapping[str, Array]

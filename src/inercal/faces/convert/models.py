@@ -9,9 +9,9 @@ from typing import Any
 from inercal.faces.convert import correct, over_temperature, platform, rate_test, table, table_result
 from inercal.faces.convert.correction import Correction, Model, temperature_range, uncertain, watching
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 
 TABLE = "calibrate turntable"
 """Command whose estimates are of an instrument on a table."""

@@ -16,14 +16,14 @@ from inercal.faces.convert.correct import ImuModel, imu_model
 from inercal.foundation._files import read_bytes
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.basis import Basis, provenance
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import GYRO_G_SENSITIVITY, TERMS
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.read import source_of
+from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import STANDARD_GRAVITY
 
 CONVENTIONS: dict[str, Convention] = {

@@ -11,10 +11,10 @@ import numpy as np
 
 from inercal.faces.convert.correction import Correction, Model, Samples, factor_of, one_clock
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import is_channel
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import Unit, parse_unit
 
 COMMAND = "temperature"

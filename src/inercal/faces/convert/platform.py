@@ -23,10 +23,10 @@ from inercal.faces.convert.correction import Correction, Samples, factor_of, one
 from inercal.faces.convert.platform_rig import RigPlatform, applied, at_port, in_need
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from inercal.systems.selfcal.platform.states import KIND_OF

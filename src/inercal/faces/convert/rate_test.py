@@ -11,9 +11,9 @@ import numpy as np
 from inercal.faces.convert.correction import Correction, Samples, factor_of, one_clock, range_of, widened
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import Unit, parse_unit
 
 _ROUNDS = 30

@@ -9,10 +9,10 @@ import numpy as np
 from inercal.faces.convert.correction import range_of
 from inercal.faces.convert.table import TableInstrument
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
 from inercal.foundation.instruments.polynomial import Monomial
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 
 _SMALLEST = 1e-9

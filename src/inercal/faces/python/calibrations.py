@@ -7,9 +7,9 @@ from pathlib import Path
 
 from inercal.faces.python.result import Result, View, loaded
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.listed import SYSTEMS
 
 
@@ -66,8 +66,8 @@ def compare(first: Result | Estimate | str | Path, second: Result | Estimate | s
     >>> ic.compare(found, found)["K1_x"].value
     0.0
     """
-    from inercal.foundation.estimate.compare import Saved
-    from inercal.foundation.estimate.compare import compare as compared
+    from inercal.foundation.results.compare import Saved
+    from inercal.foundation.results.compare import compare as compared
 
     files = [Saved(*estimate_of(each, where)) for each, where in ((first, "first"), (second, "second"))]
     return of_comparison(compared(*files), files[0].estimate)
@@ -166,7 +166,7 @@ def read_estimate(path: str | Path) -> Estimate:
         from inercal.laboratory.certificate.reading import estimate_of_certificate
 
         return estimate_of_certificate(path)
-    from inercal.foundation.estimate.files import load as of_file
+    from inercal.foundation.results.files import load as of_file
 
     return of_file(path)
 

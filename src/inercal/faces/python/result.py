@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.foundation.errors import InputError, MissingExtraError
-from inercal.foundation.estimate.result import Estimate, Parameter
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate, Parameter
+from inercal.foundation.results.rounding import rounded
 
 if TYPE_CHECKING:
     import pandas
@@ -130,8 +130,8 @@ class Result:
         A ``.json`` or ``.toml`` file holds all of the result in SI, and `inercal.load` reads it; any other holds what
         was found from row to row. Raises `InputError` where there are no rows, or the file cannot be written.
         """
-        from inercal.foundation.estimate.files import save
         from inercal.foundation.records.write import SUFFIXES, write_record
+        from inercal.foundation.results.files import save
 
         suffix = Path(path).suffix.lower()
         if self.view.rows is not None and suffix in SUFFIXES:

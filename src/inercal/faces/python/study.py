@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 
 from inercal.faces.studies.text import toml
 from inercal.foundation.errors import InputError, StudyError
-from inercal.foundation.estimate.result import Estimate, without_coefficients
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate, without_coefficients
 from inercal.systems.contract import System
 from inercal.systems.imu.system import SYSTEM as IMU
 from inercal.systems.listed import SYSTEMS

@@ -11,8 +11,8 @@ from inercal.faces.python.calibrations import estimate_of
 from inercal.faces.python.result import Result
 from inercal.faces.python.study import Study, study, study_of
 from inercal.foundation.errors import InputError, StudyError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.system import SYSTEM as IMU
 from inercal.systems.listed import SYSTEMS
 

@@ -15,11 +15,11 @@ from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Note
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.foundation.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.foundation.noise.outcome import ChannelNoise, Noise
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.table import aligned
 from inercal.foundation.units import parse_unit
 
 #: symbol -> averaging time [s] at which it is read off its slope, the slope in words, the slope's colour

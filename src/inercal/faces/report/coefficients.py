@@ -13,9 +13,9 @@ from inercal.faces.report.marks import Axis, Bars, Cells, Colours, Dots, Level, 
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, DIVERGING, INK, SEQUENTIAL, plain_unit
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded
 
 _SMALL = 0.02
 """Share that a source reaches in no coefficient, to be drawn together with others of the kind."""

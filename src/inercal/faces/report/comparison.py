@@ -13,12 +13,12 @@ from inercal.faces.report.html import page as template
 from inercal.faces.report.marks import Axis, Bars, Dots, Level, Mark, Panel, Strips
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.shown import temperature
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import temperature
+from inercal.foundation.results.table import aligned
 
 _FAR = 4.0
 """Normalised error beyond which the axis of the picture becomes logarithmic."""

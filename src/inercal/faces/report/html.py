@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from inercal.faces.report.formulas import clauses
 from inercal.faces.report.style import plain_unit
-from inercal.foundation.estimate.budget import BudgetItem
-from inercal.foundation.estimate.files import plain_objects
-from inercal.foundation.estimate.result import Estimate, Parameter
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.shown import in_words
-from inercal.foundation.estimate.table import Table
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.files import plain_objects
+from inercal.foundation.results.result import Estimate, Parameter
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import in_words
+from inercal.foundation.results.table import Table
 from inercal.foundation.units import parse_unit
 
 if TYPE_CHECKING:

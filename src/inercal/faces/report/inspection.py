@@ -14,11 +14,11 @@ from inercal.faces.report.marks import Axis, Line, Mark, Note, Panel, Strips
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, envelope, plain_unit
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.table import Table
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column, counted_rows
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.table import Table
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ROWS = re.compile(r"(?:.*, )?rows? ((?:\d+(?:-\d+)?(?:, )?)+)")

@@ -36,8 +36,8 @@ from numpy.typing import NDArray
 
 from inercal.faces.stream.doubt import Doubt, HeldRows
 from inercal.faces.stream.lines import Line, Lines, Sample
+from inercal.foundation.computing.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.write import number
@@ -89,7 +89,7 @@ class Recursive(Protocol[S]):
     """An estimator that goes from sample to sample.
 
     ``kind`` names it, ``columns`` are the titles of its output lines, and ``settings`` is a state (in the sense
-    of `inercal.foundation.estimate.checkpoint`) of all that, with the samples, decides its numbers.
+    of `inercal.foundation.computing.checkpoint`) of all that, with the samples, decides its numbers.
     """
 
     @property

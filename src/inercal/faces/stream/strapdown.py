@@ -19,11 +19,11 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.dwells import Dwell
-from inercal.systems.strapdown.coefficients import SIZE, free_places, names, slope, stated
-from inercal.systems.strapdown.error_state import Filtered, filtered
+from inercal.systems.strapdown.fit.error_state import Filtered, filtered
+from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
 from inercal.systems.strapdown.limits import LIMITS
-from inercal.systems.strapdown.rests import found_rests, nodes_of
-from inercal.systems.strapdown.samples import Samples
+from inercal.systems.strapdown.model.coefficients import SIZE, free_places, names, slope, stated
+from inercal.systems.strapdown.model.samples import Samples
 from inercal.systems.strapdown.settings import StrapdownSettings
 
 _HEAD = 51

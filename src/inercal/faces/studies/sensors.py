@@ -322,7 +322,7 @@ def _without_u(quantity: Quantity, key: str, where: str | Path) -> Quantity:
 def _from_file(name: str, table: Any, where: str | Path) -> tuple[float, float, Per, str]:
     """Scale, bias, quantity of the column, and a caution, from a calibration of ours: output = K0 + K1 a,
     or D_F + S w."""
-    from inercal.foundation.estimate.files import load
+    from inercal.foundation.results.files import load
 
     key = f"sensors.{name}.calibration"
     slope, offset = ("S", "D_F") if name in GYROS else ("K1", "K0")

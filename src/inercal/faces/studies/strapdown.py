@@ -43,7 +43,7 @@ from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import Quantity, parse_unit, shown
-from inercal.systems.strapdown.coefficients import OPTIONS, names
+from inercal.systems.strapdown.model.coefficients import OPTIONS, names
 from inercal.systems.strapdown.settings import (
     ESTIMABLE,
     Design,

@@ -6,9 +6,9 @@ import numpy as np
 
 from inercal.faces.validate.case import Case
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.least_squares import least_squares, solve
-from inercal.foundation.estimate.result import coverage_factor
 from inercal.foundation.geometry import earth, rotations
+from inercal.foundation.inference.least_squares import least_squares, solve
+from inercal.foundation.results.result import coverage_factor
 from inercal.foundation.units import parse_quantity, parse_unit
 
 _PI = 3.14159265358979324

@@ -6,9 +6,9 @@ import numpy as np
 
 from inercal.faces.validate.case import Case
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.geometry.site import Site
 from inercal.foundation.records.record import Record, record_of
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.settings import ImuSettings, KnownRatesSettings, KnownTurnsSettings, MeansSettings

@@ -19,10 +19,10 @@ from inercal.examples import EXAMPLES, shipped
 from inercal.faces.validate import foundation, noise
 from inercal.faces.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
 from inercal.foundation._jit import source_hash
-from inercal.foundation.estimate.basis import Basis
-from inercal.foundation.estimate.executors import Executor, Processes, Serial
-from inercal.foundation.estimate.result import Estimate, timed
+from inercal.foundation.computing.executors import Executor, Processes, Serial
 from inercal.foundation.findings import Finding, Status
+from inercal.foundation.results.basis import Basis
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems import listed
 
 SYSTEMS: Mapping[str, str] = {

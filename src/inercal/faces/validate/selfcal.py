@@ -10,7 +10,7 @@ import numpy as np
 from inercal.faces.studies.load import load_selfcal_study
 from inercal.faces.validate.case import Case, record_of, study_of
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.consistency import nis
+from inercal.foundation.inference.consistency import nis
 from inercal.systems.selfcal.before.bounds import PathBounds, bounds
 from inercal.systems.selfcal.estimators import FilterKind
 from inercal.systems.selfcal.filters.filter_result import FilterResult

@@ -9,10 +9,22 @@ import numpy as np
 from inercal.faces.studies.load import load_strapdown_study
 from inercal.faces.validate.case import Case, record_of, study_of
 from inercal.foundation.arrays import Array
-from inercal.systems.strapdown.coefficients import KA, KG, SIZE, TAU, A, D, R, array_of, names, slope, stated
-from inercal.systems.strapdown.delay import delayed
-from inercal.systems.strapdown.error_state import filtered
-from inercal.systems.strapdown.samples import Samples, freed
+from inercal.systems.strapdown.fit.error_state import filtered
+from inercal.systems.strapdown.model.coefficients import (
+    KA,
+    KG,
+    SIZE,
+    TAU,
+    A,
+    D,
+    R,
+    array_of,
+    names,
+    slope,
+    stated,
+)
+from inercal.systems.strapdown.model.delay import delayed
+from inercal.systems.strapdown.model.samples import Samples, freed
 from inercal.systems.strapdown.settings import StrapdownSettings
 from inercal.systems.strapdown.task import StrapdownCalibration, calibrate
 

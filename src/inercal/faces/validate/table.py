@@ -13,8 +13,8 @@ from inercal.faces.studies.turntable import turntable_study
 from inercal.faces.validate.case import Case
 from inercal.faces.validate.gyrowheel import DRIFT, TABLE, settings_of
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.record import record_of
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.plans import listed
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

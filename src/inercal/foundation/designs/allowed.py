@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from inercal.foundation.designs.candidates import Candidates
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.identifiability import few_terms, identify, in_words
+from inercal.foundation.inference.identifiability import few_terms, identify, in_words
 
 Mask = NDArray[np.bool_]
 

@@ -10,7 +10,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.candidates import Candidates
 from inercal.foundation.designs.criteria import Criterion, information_svd
-from inercal.foundation.estimate.identifiability import identify, in_words
+from inercal.foundation.inference.identifiability import identify, in_words
 
 _PART = 1e-6
 """Part of a coefficient in a null vector of unit length that is more than rounding."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.candidates import Candidates
-from inercal.foundation.estimate.identifiability import Identifiability, identify, in_words
+from inercal.foundation.inference.identifiability import Identifiability, identify, in_words
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.allowed import Mask, require
 from inercal.foundation.designs.candidates import Candidates
 from inercal.foundation.designs.criteria import Criterion, covariance
 from inercal.foundation.designs.search import from_starts
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.executors import Executor
 
 if TYPE_CHECKING:
     from inercal.foundation.designs.exchange_kernel import State

@@ -12,7 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from inercal.foundation.estimate.executors import Executor, numbered
+from inercal.foundation.computing.executors import Executor, numbered
 from inercal.foundation.findings import Finding
 
 T = TypeVar("T")

@@ -12,10 +12,6 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.basis import Basis, provenance
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.noise import SYMBOLS
 from inercal.foundation.instruments.terms import noise_term
@@ -25,6 +21,10 @@ from inercal.foundation.noise.rest import Unrest, unrest
 from inercal.foundation.records.column import Column, usable_interval
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import RAW
 
 COMMAND = "allan"

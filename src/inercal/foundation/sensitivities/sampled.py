@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.executors import Executor, numbered
+from inercal.foundation.computing.executors import Executor, numbered
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.rigs.distribution import Distribution
 from inercal.foundation.rigs.outputs import Output

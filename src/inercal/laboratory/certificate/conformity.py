@@ -12,7 +12,7 @@ from inercal.laboratory.specification import Conformity, Specification
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
 
 
 def limits_used(specification: Specification, estimates: Sequence[Estimate], where: object) -> None:

@@ -28,7 +28,7 @@ from inercal.faces.studies.schema import TomlSchema
 from inercal.faces.studies.starting import UNKNOWN
 from inercal.foundation._toml import Strict, check, read_toml
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import shown
 from inercal.laboratory.certificate.elements import plain
 

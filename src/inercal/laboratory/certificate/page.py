@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from inercal.faces.report.style import plain_unit
 from inercal.foundation.errors import QuantityError
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.instruments.dsi import dsi
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.rounding import rounded
 from inercal.laboratory.certificate.elements import NAMESPACES
 from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, quantities_of, text
 

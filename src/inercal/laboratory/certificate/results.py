@@ -11,11 +11,11 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.files import to_json
-from inercal.foundation.estimate.result import COVERAGE, Estimate, coverage_factor
 from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent
 from inercal.foundation.instruments.reference_types import PREFIX, reference_type
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.results.files import to_json
+from inercal.foundation.results.result import COVERAGE, Estimate, coverage_factor
 from inercal.laboratory.certificate.administration import software
 from inercal.laboratory.certificate.conformity import stated
 from inercal.laboratory.certificate.elements import (
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from inercal.faces.studies.laboratory import EquipmentTable
-    from inercal.foundation.estimate.result import Parameter
+    from inercal.foundation.results.result import Parameter
     from inercal.foundation.units import Quantity
     from inercal.laboratory.certificate.lab import LabFile
     from inercal.laboratory.specification import Conformity

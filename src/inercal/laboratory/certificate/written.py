@@ -9,8 +9,8 @@ from lxml import etree
 
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import shown
 from inercal.laboratory.certificate.administration import administrative
 from inercal.laboratory.certificate.conformity import limits_used, statement

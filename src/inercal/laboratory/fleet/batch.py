@@ -12,13 +12,13 @@ from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Study, kind_of, read_study
 from inercal.foundation._files import write_text
 from inercal.foundation.addresses import holds_secret
+from inercal.foundation.computing.cluster import LOCAL, ChunkLostError, Cluster, place
+from inercal.foundation.computing.executors import Executor, Processes
 from inercal.foundation.errors import InputError, MissingExtraError
-from inercal.foundation.estimate.basis import Basis, provenance
-from inercal.foundation.estimate.cluster import LOCAL, ChunkLostError, Cluster, place
-from inercal.foundation.estimate.executors import Executor, Processes
-from inercal.foundation.estimate.files import save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Status
+from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.files import save
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.fleet.fleet import Fleet, fleet_of
 from inercal.laboratory.fleet.manifest import Unit, read_manifest
 from inercal.laboratory.fleet.page import page, pictures, result_of, summary, table
@@ -64,8 +64,8 @@ def batch(
     workers : int
         Processes. The digits are the same for any number.
     cluster : str, optional
-        Address of a dask cluster (`inercal.foundation.estimate.cluster.Cluster`), whose workers see manifest, study and
-        folder under the same paths as this process.
+        Address of a dask cluster (`inercal.foundation.computing.cluster.Cluster`), whose workers see manifest, study
+        and folder under the same paths as this process.
     store : str, optional
         Store in which every result is kept.
     progress : callable

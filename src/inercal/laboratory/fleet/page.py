@@ -13,10 +13,10 @@ from inercal.faces.report.html import page as template
 from inercal.faces.report.marks import Axis, Bars, Dots, Level, Line, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, QUIET
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.records.places import counted
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.table import aligned
 from inercal.laboratory.fleet.capability import LEVEL, Index, Spread
 from inercal.laboratory.fleet.fleet import Fleet, Trend
 from inercal.laboratory.specification import group_of

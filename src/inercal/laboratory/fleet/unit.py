@@ -23,9 +23,9 @@ from inercal.faces.python.study import Study, kind_of, read_study
 from inercal.foundation._files import write_text
 from inercal.foundation.addresses import hidden_in, shown_address, without_secrets
 from inercal.foundation.errors import InercalError, InputError, MissingExtraError
-from inercal.foundation.estimate.files import plain_objects, save
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.inputs import program
+from inercal.foundation.results.files import plain_objects, save
+from inercal.foundation.results.result import Estimate
 from inercal.laboratory.fleet.manifest import Unit, read_manifest
 from inercal.laboratory.specification import Specification, judged, specification_of
 

@@ -23,10 +23,10 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.rounding import short
-from inercal.foundation.estimate.table import Table, heads
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.rounding import short
+from inercal.foundation.results.table import Table, heads
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.systems.aoa.fusion.problem import problem

@@ -11,8 +11,8 @@ import numpy as np
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.errors import InputError, RecordError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.diagnosis.choice import decided_with, of_vibration
 from inercal.systems.aoa.diagnosis.examination import implausible

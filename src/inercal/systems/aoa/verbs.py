@@ -11,9 +11,9 @@ import numpy as np
 
 from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Progress, Study, calibrations, designed_by, one_run
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.read import source_of
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa import task
 from inercal.systems.aoa.result.balance import Joined, read_balance
 from inercal.systems.aoa.result.balance import join as joining

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import WORST_BY_SIZE
-from inercal.foundation.estimate.least_squares import NonlinearFit
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.findings import Status
+from inercal.foundation.inference.identifiability import WORST_BY_SIZE
+from inercal.foundation.inference.least_squares import NonlinearFit
+from inercal.foundation.results.rounding import rounded
 from inercal.systems.imu.limits import LIMITS
 
 

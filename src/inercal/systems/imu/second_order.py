@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import Uncertainty
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.budget import Uncertainty
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import ImuSettings
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.remarks import exact_gravity
-from inercal.foundation.estimate.result import judged
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.remarks import exact_gravity
+from inercal.foundation.results.result import judged
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import (
     AidedSettings,

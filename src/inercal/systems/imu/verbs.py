@@ -27,7 +27,7 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
     from inercal.faces.python.study import calibrations, of_files, with_span
-    from inercal.foundation.estimate.repeat import combine_runs
+    from inercal.foundation.results.repeat import combine_runs
     from inercal.systems.imu.task import calibrate_files, in_order
 
     if in_order(study.settings):

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.computing.executors import Executor, Threads
+from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.executors import Executor, Threads
-from inercal.foundation.estimate.runs import run
 from inercal.foundation.geometry.rotations import boxminus, conjugate
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
 from inercal.systems.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
@@ -29,7 +29,7 @@ from inercal.systems.selfcal.platform.coefficients import product_slope, to_prod
 from inercal.systems.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.coverage import Coverage, Nees
+    from inercal.foundation.inference.coverage import Coverage, Nees
 
 
 REFERENCES = (
@@ -123,14 +123,14 @@ class Campaign:
     @property
     def coverage(self) -> Coverage:
         """Coverage of the 95 % intervals."""
-        from inercal.foundation.estimate.coverage import coverage
+        from inercal.foundation.inference.coverage import coverage
 
         return coverage(self.error, self.u)
 
     @property
     def nees(self) -> Nees:
         """Normalised estimation error squared of all coefficients together."""
-        from inercal.foundation.estimate.coverage import nees
+        from inercal.foundation.inference.coverage import nees
 
         return nees(self.joint_error, self.joint_covariance)
 
@@ -166,9 +166,9 @@ def campaign(
 ) -> Campaign:
     """Simulate and estimate a study with plan and truth many times, with its estimator or another ``kind``.
 
-    ``runs``, ``seed``, ``executor``, ``folder``, ``progress`` as in `inercal.foundation.estimate.runs.run`; two threads
-    if there is no executor. Raises StudyError where the study has no plan or truth, or a base that would have to be
-    found first, and InputError where fewer than two runs converged.
+    ``runs``, ``seed``, ``executor``, ``folder``, ``progress`` as in `inercal.foundation.computing.runs.run`; two
+    threads if there is no executor. Raises StudyError where the study has no plan or truth, or a base that would have
+    to be found first, and InputError where fewer than two runs converged.
     """
     stated_well(settings, "a campaign")
     of_study, made = problem(settings), experiment(settings)

@@ -26,14 +26,14 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.basis import studied
-from inercal.foundation.estimate.budget import TypeA, TypeB, combine
-from inercal.foundation.estimate.identifiability import UNSEEN
-from inercal.foundation.estimate.remarks import at_prior, exact_inputs, missed, reached
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
+from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.records.places import counted as so_many
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import studied
+from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, reached
+from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.observability import Observability, observability
 from inercal.systems.selfcal.estimators import ESTIMATORS

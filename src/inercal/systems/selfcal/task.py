@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded
-from inercal.foundation.estimate.table import Table
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.table import Table
 from inercal.systems.selfcal.before import considered
 from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.diagnosis.examination import diagnose

@@ -10,8 +10,8 @@ import numpy as np
 
 from inercal.faces.python.result import Result, View, of_coefficients
 from inercal.faces.python.study import Progress, Study, calibrations, designed_by, of_files, with_span
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.executors import Executor
 from inercal.foundation.records.record import Record
 from inercal.systems.selfcal import task
 
@@ -91,7 +91,7 @@ def _together(records: Sequence[Record], study: Study, progress: Progress) -> Re
 
 def _repeated(calibrated: Sequence[task.Calibration], records: Sequence[Record]) -> Result:
     """The estimate of repeat runs together."""
-    from inercal.foundation.estimate.repeat import combine_runs
+    from inercal.foundation.results.repeat import combine_runs
 
     runs = [each.estimate for each in calibrated]
     estimate = combine_runs(runs)

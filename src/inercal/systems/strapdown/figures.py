@@ -13,8 +13,8 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, envelope
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
-    from inercal.systems.strapdown.design import DesignedTurns
+    from inercal.foundation.results.result import Estimate
+    from inercal.systems.strapdown.before.design import DesignedTurns
     from inercal.systems.strapdown.task import StrapdownCalibration
 
 
@@ -81,7 +81,7 @@ def _rests(calibration: StrapdownCalibration) -> Picture:
 
 def progress(designed: DesignedTurns) -> Picture:
     """Largest u of each kind of coefficient, over its goal, after each rest of a plan."""
-    from inercal.systems.strapdown.design import by_kind
+    from inercal.systems.strapdown.before.design import by_kind
 
     marks: list[Mark] = [Level(1.0, "goal", ALARM, 0.9)]
     for k, (kind, ratio) in enumerate(by_kind(designed).items()):

@@ -15,7 +15,7 @@ from inercal.foundation.records.places import counted, places
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import RAW
 from inercal.systems.strapdown.limits import LIMITS
-from inercal.systems.strapdown.samples import Samples
+from inercal.systems.strapdown.model.samples import Samples
 
 
 def evened(record: Record) -> Record:

@@ -25,7 +25,7 @@ from inercal.foundation.keys import (
     within,
 )
 from inercal.foundation.units import Quantity
-from inercal.systems.strapdown.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, USUAL, Frame
+from inercal.systems.strapdown.model.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, USUAL, Frame
 
 Estimator = Literal["batch", "error-state"]
 Term = Literal["k2", "size", "delay", "asymmetry", "g_sensitivity"]

@@ -18,8 +18,8 @@ from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import Axis, elementary
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.units import parse_unit
-from inercal.systems.strapdown.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
-from inercal.systems.strapdown.samples import Samples
+from inercal.systems.strapdown.model.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
+from inercal.systems.strapdown.model.samples import Samples
 from inercal.systems.strapdown.settings import Motion, Noise, Plan, StrapdownSettings
 
 AXES: Final[tuple[Axis, Axis, Axis]] = ("x", "y", "z")

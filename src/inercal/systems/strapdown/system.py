@@ -79,25 +79,25 @@ def _stream(settings: StrapdownSettings, interval: float, say: Say, say_finding:
 
 
 def _foresight(settings: StrapdownSettings) -> Foresight:
-    from inercal.systems.strapdown.foresight import foresight
+    from inercal.systems.strapdown.before.foresight import foresight
 
     return foresight(settings)
 
 
 def _verticals(settings: StrapdownSettings) -> Array:
-    from inercal.systems.strapdown.foresight import verticals
+    from inercal.systems.strapdown.before.foresight import verticals
 
     return verticals(settings)
 
 
 def _rows(settings: StrapdownSettings) -> Sequence[Sequence[str]]:
-    from inercal.systems.strapdown.design import stated_turns
+    from inercal.systems.strapdown.before.design import stated_turns
 
     return stated_turns(settings.plan) if settings.plan is not None else ()
 
 
 def _named() -> Mapping[str, Mapping[str, Any]]:
-    from inercal.systems.strapdown.design import nineteen
+    from inercal.systems.strapdown.before.design import nineteen
 
     return {"19 positions": {"plan.start": ["0 deg", "-90 deg", "0 deg"], "plan.turns": nineteen()}}
 

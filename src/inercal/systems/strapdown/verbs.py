@@ -30,7 +30,7 @@ def calibrate(
 
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
-    from inercal.foundation.estimate.repeat import combine_runs
+    from inercal.foundation.results.repeat import combine_runs
 
     calibrated = calibrations(records, study, progress, task.calibrate)
     runs = [each.estimate for each in calibrated]
@@ -52,7 +52,7 @@ def calibrate(
 
 def prepare_design(study: Study) -> None:
     """Load, or compile, the kernels of `design`."""
-    from inercal.systems.strapdown.bounds import Pieces, bounds
+    from inercal.systems.strapdown.before.bounds import Pieces, bounds
     from inercal.systems.strapdown.settings import Plan
 
     with study.at_fault():
@@ -61,9 +61,9 @@ def prepare_design(study: Study) -> None:
 
 def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:
     """Judge a plan, and search for a better one; ``evidence`` is the
-    `inercal.systems.strapdown.design.DesignedTurns`."""
-    from inercal.systems.strapdown.design import REFERENCES
-    from inercal.systems.strapdown.design import design as search
+    `inercal.systems.strapdown.before.design.DesignedTurns`."""
+    from inercal.systems.strapdown.before.design import REFERENCES
+    from inercal.systems.strapdown.before.design import design as search
 
     by = () if progress is None else (progress,)
     designed, result = designed_by("design strapdown", study, lambda: search(study.settings, *by), REFERENCES)
@@ -86,7 +86,7 @@ def design(study: Study, progress: Callable[[int, int], None] | None = None) -> 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
     """A simulated record of a strapdown unit that rests and turns as the study plans."""
-    from inercal.systems.strapdown.coefficients import array_of
+    from inercal.systems.strapdown.model.coefficients import array_of
     from inercal.systems.strapdown.simulate import simulated, to_record
 
     settings = study.settings

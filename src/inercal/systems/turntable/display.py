@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.shown import in_words
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.shown import in_words
+from inercal.foundation.results.table import aligned
 from inercal.foundation.units import STANDARD_GRAVITY, Unit
 
 _ARCSEC = np.radians(1.0 / 3600.0)

@@ -1,7 +1,7 @@
 """Noise of the readings of each channel beside what the table explains, by restricted likelihood.
 
 The readings have the covariance ``V = V_table + sum_c s_c^2 E_c``, E_c picking those of channel c. Their likelihood
-(`inercal.foundation.estimate.variances`) is greatest where, for each channel that nobody states,
+(`inercal.foundation.inference.variances`) is greatest where, for each channel that nobody states,
 
     r^T P E_c P r = tr(P E_c) ,   P = V^-1 - V^-1 A (A^T V^-1 A)^-1 A^T V^-1
 
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.variances import Score, Solved, highest
+from inercal.foundation.inference.variances import Score, Solved, highest
 from inercal.systems.turntable.weights import Weights, whitened
 
 _TINY = 1e-100

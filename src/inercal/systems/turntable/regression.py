@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import Identifiability, few_terms, identify, in_words
+from inercal.foundation.inference.identifiability import Identifiability, few_terms, identify, in_words
 from inercal.foundation.instruments.polynomial import ChannelModel
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel

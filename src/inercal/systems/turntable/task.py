@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.foundation.estimate.result import timed
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import timed
 from inercal.systems.turntable.positions.calibration import PositionCalibration, calibrate_positions
 from inercal.systems.turntable.positions.simulate import simulate as simulate_positions
 from inercal.systems.turntable.rate.calibration import RateCalibration, calibrate_rates

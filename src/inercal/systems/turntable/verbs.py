@@ -10,9 +10,9 @@ import numpy as np
 
 from inercal.faces.python.result import Result, View, of_coefficients
 from inercal.faces.python.study import Progress, Study, calibrations, designed_by
-from inercal.foundation.estimate.executors import Executor
-from inercal.foundation.estimate.result import Estimate, without_coefficients
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate, without_coefficients
 from inercal.systems.turntable import task
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def calibrate(
 def _combined(calibrated: Sequence[Any], first: Record) -> Result:
     """The result of repeat runs."""
     from inercal.faces.python.study import with_span
-    from inercal.foundation.estimate.repeat import combine_runs
+    from inercal.foundation.results.repeat import combine_runs
     from inercal.systems.turntable.display import displayed
 
     estimate = with_span(combine_runs([each.estimate for each in calibrated]), first)

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inercal.foundation.estimate.hypotheses import Fitted, tried
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.hypotheses import Fitted, tried
 from inercal.systems.aoa.diagnosis.effect import of_noise
 from inercal.systems.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, stretch
 from inercal.systems.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults

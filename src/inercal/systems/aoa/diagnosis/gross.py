@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Hypothesis
 from inercal.foundation.findings import EVERYTHING
+from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.diagnosis.fit_quality import Case, fit_quality, rms
 from inercal.systems.aoa.diagnosis.noise_check import scatter

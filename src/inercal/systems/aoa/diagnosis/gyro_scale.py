@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.foundation.estimate.hypotheses import CLEAR, Fitted
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.hypotheses import CLEAR, Fitted
 from inercal.systems.aoa.diagnosis.effect import effect
 from inercal.systems.aoa.diagnosis.fit_quality import Case, judged
 from inercal.systems.aoa.diagnosis.small import beside_a_scale

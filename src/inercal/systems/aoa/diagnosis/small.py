@@ -1,7 +1,7 @@
 """Constant errors that the fusion leaves out: hypotheses with one parameter, and the fusion as their judge.
 
 Innovations of a filter are white where its model holds, which makes them the residuals of the score test
-(`inercal.foundation.estimate.hypotheses`), over the stretch that is judged. The model is never exact enough for chance
+(`inercal.foundation.inference.hypotheses`), over the stretch that is judged. The model is never exact enough for chance
 alone to decide: the likeliest errors are fitted to the end, and the one that takes most of the misfit away is taken, if
 it takes half. At one angle a bias, a scale, an axis and gravity look alike: equally good errors are named beside it.
 """
@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Fits, Fitted, Hypothesis, search
 from inercal.foundation.findings import EVERYTHING
+from inercal.foundation.inference.hypotheses import Fits, Fitted, Hypothesis, search
 from inercal.foundation.units import STANDARD_GRAVITY, Quantity, parse_unit
 from inercal.systems.aoa.diagnosis.fit_quality import Case, fit_quality
 from inercal.systems.aoa.limits import LIMITS

@@ -13,8 +13,8 @@ from inercal.faces.report.marks import Arrows, Axis, Band, Dots, Level, Line, Ma
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import UNSEEN
-from inercal.foundation.estimate.rounding import rounded
+from inercal.foundation.inference.identifiability import UNSEEN
+from inercal.foundation.results.rounding import rounded
 from inercal.systems.aoa.limits import LIMITS
 
 _USUAL = (5e-3, 5.0)

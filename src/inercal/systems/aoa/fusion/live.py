@@ -26,7 +26,7 @@ from inercal.systems.aoa.reading.recording import Recording
 
 
 class LiveState(NamedTuple):
-    """State after a row, in the sense of `inercal.foundation.estimate.checkpoint`.
+    """State after a row, in the sense of `inercal.foundation.computing.checkpoint`.
 
     ``fusion`` is the state of the filter, ``waiting`` (j,) [s] the stamps of the rows that are not answered yet, and
     ``late`` the number of successive rows at the end that are not later than those before.

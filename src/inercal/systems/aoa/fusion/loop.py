@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation._jit import allocating, kernel
-from inercal.foundation.estimate.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import Row, empty_row
 from inercal.systems.aoa.fusion.model import (
     WIDEST,
     Constants,

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation._jit import kernel
-from inercal.foundation.estimate.kalman import Row
+from inercal.foundation.inference.kalman import Row
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.limits import LIMITS

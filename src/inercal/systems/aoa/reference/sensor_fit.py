@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.identifiability import Learned, learned
-from inercal.foundation.estimate.result import Parameter
+from inercal.foundation.inference.identifiability import Learned, learned
+from inercal.foundation.results.result import Parameter
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.reference.readings import OVERLAP, ReferenceMotion, reference

@@ -6,7 +6,7 @@ The means of the readings at K rests are fitted, of each accelerometer its scale
 
 The error of a reading of the reference is one and the same for all rows of a rest and for all sensors: it enters the
 covariance of the readings of a rest as sigma^2 s s^T, s their slopes by the angle, beside their own means' scatter.
-sigma is that of the largest restricted likelihood (`inercal.foundation.estimate.variances`), and where chi-square is
+sigma is that of the largest restricted likelihood (`inercal.foundation.inference.variances`), and where chi-square is
 still above its degrees of freedom the covariance grows with it. What rests do not show stays at ten times the
 study's prior, as in `inercal.systems.aoa.reference.sensor_fit`; the zero of the reference is taken as true.
 """
@@ -20,8 +20,8 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.identifiability import learned
-from inercal.foundation.estimate.variances import Solved, solved
+from inercal.foundation.inference.identifiability import learned
+from inercal.foundation.inference.variances import Solved, solved
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.means import mean_u
 from inercal.systems.aoa.reading.recording import Recording

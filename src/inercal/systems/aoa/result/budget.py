@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import BudgetItem
+from inercal.foundation.results.budget import BudgetItem
 from inercal.systems.aoa.fusion.band import fused
 from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.fusion.problem import problem as stated_problem

@@ -12,8 +12,8 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.files import load as load_estimate
-from inercal.foundation.estimate.result import Estimate
+from inercal.foundation.results.files import load as load_estimate
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reference.corrections import corrected as put_right
 from inercal.systems.aoa.reference.corrections import is_verified, prior_of
@@ -45,7 +45,7 @@ def load(path: str | Path, settings: AoaSettings) -> tuple[dict[str, float], dic
     Raises
     ------
     InputError
-        The file cannot be read, or is no result (`inercal.foundation.estimate.files.load`).
+        The file cannot be read, or is no result (`inercal.foundation.results.files.load`).
     StudyError
         It is of another command, holds no coefficients, ended with a bad verdict, or is of other sensors.
     """

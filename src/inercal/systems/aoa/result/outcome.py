@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.basis import Basis, conditions_of, studied
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.geometry.rotations import principal
 from inercal.foundation.instruments.terms import Term, term
+from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import FilterResult
 from inercal.systems.aoa.fusion.problem import FilterProblem

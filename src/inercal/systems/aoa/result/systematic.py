@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.files import load as load_estimate
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.geometry.rotations import principal
+from inercal.foundation.results.files import load as load_estimate
+from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles, stated_roll
 from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
 from inercal.systems.aoa.fusion.problem import FilterProblem

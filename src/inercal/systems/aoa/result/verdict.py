@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.factor import NEGATIVE
-from inercal.foundation.estimate.identifiability import UNSEEN
 from inercal.foundation.findings import CODES, Finding, Status, causes
+from inercal.foundation.inference.factor import NEGATIVE
+from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import FilterResult

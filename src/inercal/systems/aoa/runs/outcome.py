@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from inercal.foundation.estimate.basis import studied
-from inercal.foundation.estimate.result import Estimate
-from inercal.foundation.estimate.rounding import rounded, short
-from inercal.foundation.estimate.table import Table, heads
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.places import counted, counted_names
+from inercal.foundation.results.basis import studied
+from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.rounding import rounded, short
+from inercal.foundation.results.table import Table, heads
 from inercal.systems.aoa.result.outcome import COMMAND, REFERENCES
 from inercal.systems.aoa.runs.run_table import Run, RunTable
 from inercal.systems.aoa.runs.summary import AtPoint, Oscillation

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.errors import InputError, RecordError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.record import Record, record_of
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.aoa import task
 from inercal.systems.aoa.result.carry_over import posterior_of

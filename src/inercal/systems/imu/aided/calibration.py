@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.aided.blocks import Blocks, cut
 from inercal.systems.imu.aided.coefficients import gain_names
 from inercal.systems.imu.aided.diagnosis.fit_quality import knocks

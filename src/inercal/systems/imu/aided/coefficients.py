@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeA, TypeB
 from inercal.foundation.geometry.site import Site
 from inercal.foundation.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.imu.aided.fit import Fit, Sensor
 from inercal.systems.imu.limits import LIMITS
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import Identifiability, identify
+from inercal.foundation.inference.identifiability import Identifiability, identify
 from inercal.systems.imu.aided.blocks import Reference, reference
 from inercal.systems.imu.aided.levels import Levels, chosen, levels
 from inercal.systems.imu.aided.model import Equation, Side, Unknowns, equations

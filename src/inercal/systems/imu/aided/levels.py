@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.variances import Solved, degrees, weighed
+from inercal.foundation.inference.variances import Solved, degrees, weighed
 from inercal.systems.imu.aided.walk import whiten
 from inercal.systems.imu.limits import LIMITS
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.basis import Basis, conditions_of, studied
-from inercal.foundation.estimate.budget import TypeB, combine
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status, settled
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.budget import TypeB, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.aided.coefficients import (
     circumstances_of,
     coefficients,

@@ -10,9 +10,9 @@ import numpy as np
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.ferraris.method import Matrices, matrices
 from inercal.systems.imu.ferraris.outcome import assemble, without_sections
 from inercal.systems.imu.ferraris.readings import Readings, read_sections

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.least_squares import NonlinearFit, solve
 from inercal.foundation.geometry.rotations import angle_between
+from inercal.foundation.inference.least_squares import NonlinearFit, solve
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.column import Triad
 from inercal.systems.imu.ferraris.detection import Detected

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.least_squares import LinearFit, least_squares
 from inercal.foundation.geometry.site import Site
+from inercal.foundation.inference.least_squares import LinearFit, least_squares
 from inercal.systems.imu.ferraris.method import Matrices
 from inercal.systems.imu.ferraris.names import UP
 from inercal.systems.imu.ferraris.readings import Readings

@@ -11,16 +11,16 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.basis import conditions_of, studied
-from inercal.foundation.estimate.budget import TypeA, TypeB, combine
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.site import Site
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.identified import weakness
 from inercal.systems.imu.known_rates.fit import NAMES, RateFit, contradiction, fit_rates
 from inercal.systems.imu.known_rates.orientations import Orientations, orientations

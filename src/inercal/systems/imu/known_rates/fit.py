@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import identify
-from inercal.foundation.estimate.least_squares import NonlinearFit, whiten
+from inercal.foundation.inference.identifiability import identify
+from inercal.foundation.inference.least_squares import NonlinearFit, whiten
 from inercal.systems.imu.known_rates.vector_sizes import SizeFit, fit_sizes, residual_rows
 from inercal.systems.imu.limits import LIMITS
 

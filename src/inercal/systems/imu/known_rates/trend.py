@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.findings import Finding
+from inercal.foundation.results.rounding import rounded
 from inercal.systems.imu.known_rates.fit import NAMES, RateFit
 from inercal.systems.imu.known_rates.vector_sizes import residual_rows
 from inercal.systems.imu.limits import LIMITS

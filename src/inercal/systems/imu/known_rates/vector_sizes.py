@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import Identifiability
-from inercal.foundation.estimate.least_squares import NonlinearFit, solve, whiten
+from inercal.foundation.inference.identifiability import Identifiability
+from inercal.foundation.inference.least_squares import NonlinearFit, solve, whiten
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.systems.imu.limits import LIMITS
 

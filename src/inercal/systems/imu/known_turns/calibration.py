@@ -15,10 +15,6 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.estimate.basis import conditions_of, studied
-from inercal.foundation.estimate.budget import TypeA, TypeB, combine
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.instruments.terms import GYRO_TRIAD, TERMS
@@ -26,6 +22,10 @@ from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.noise.dwell_means import AllanFit
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.known_turns.turn import Turn, find_turn, noise_at_rest, stamped
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import clipped_rows, unit_words

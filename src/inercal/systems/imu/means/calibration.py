@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.estimate.basis import conditions_of, studied
-from inercal.foundation.estimate.budget import TypeA, TypeB, Uncertainty, combine
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.budget import TypeA, TypeB, Uncertainty, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.identified import weakness
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.least_squares import NonlinearFit, solve
+from inercal.foundation.inference.least_squares import NonlinearFit, solve
 from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD
 from inercal.foundation.instruments.triad import TriadModel, apart
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.result import Estimate, timed
 from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.drift import (
     bias_drift_finding,

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import Uncertainty
 from inercal.foundation.findings import Finding
+from inercal.foundation.results.budget import Uncertainty
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import inverses
 from inercal.systems.imu.multiposition.gyro import GyroFit

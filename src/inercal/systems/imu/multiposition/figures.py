@@ -13,7 +13,7 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres
 from inercal.faces.report.style import ALARM, COLOURS, INK, envelope
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import WORST_BY_SIZE
+from inercal.foundation.inference.identifiability import WORST_BY_SIZE
 from inercal.foundation.records.places import counted
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.identified import pose_words
@@ -22,7 +22,7 @@ from inercal.systems.imu.multiposition.poses import Poses, dwells_at
 from inercal.systems.imu.multiposition.verdict import curing_pose
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
     from inercal.systems.imu.multiposition.gyro import GyroFit
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import Identifiability, identify
-from inercal.foundation.estimate.least_squares import NonlinearFit, least_squares, solve
+from inercal.foundation.inference.identifiability import Identifiability, identify
+from inercal.foundation.inference.least_squares import NonlinearFit, least_squares, solve
 from inercal.foundation.instruments.terms import GYRO_TRIAD
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.systems.imu.multiposition.deletion import LinearFit

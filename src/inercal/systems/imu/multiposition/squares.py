@@ -11,9 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeB, Uncertainty
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.budget import TypeB, Uncertainty
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.systems.imu.multiposition.joint import Joint, Scatter

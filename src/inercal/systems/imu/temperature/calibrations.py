@@ -10,9 +10,9 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.estimate.result import Estimate, coverage_factor
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.temperature.cubic import Cubic, fit_points
 from inercal.systems.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span

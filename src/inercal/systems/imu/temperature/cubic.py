@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.least_squares import least_squares
-from inercal.foundation.estimate.variances import degrees, solved, weighed
+from inercal.foundation.inference.least_squares import least_squares
+from inercal.foundation.inference.variances import degrees, solved, weighed
 
 PARTS = 64
 """Equal parts of a sweep whose means are taken."""

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.estimate.basis import Basis, provenance
-from inercal.foundation.estimate.budget import Uncertainty
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
+from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.budget import Uncertainty
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.temperature.cubic import Cubic
 

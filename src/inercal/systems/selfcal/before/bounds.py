@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation._jit import allocating, kernel, merged
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import Row, empty_row
 from inercal.systems.selfcal.filters.gaps import anew, walking
 from inercal.systems.selfcal.filters.problem import (
     FilterModel,

@@ -19,7 +19,7 @@ import numpy as np
 
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import Row, empty_row
 from inercal.systems.selfcal.before.bounds import Path, arrived
 from inercal.systems.selfcal.filters.gaps import anew
 from inercal.systems.selfcal.filters.problem import (

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import UNSEEN, Learned, learned
-from inercal.foundation.estimate.remarks import Goal, at_prior, missed, reached
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.findings import Finding, Status
+from inercal.foundation.inference.identifiability import UNSEEN, Learned, learned
+from inercal.foundation.results.remarks import Goal, at_prior, missed, reached
+from inercal.foundation.results.rounding import rounded
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.platform.coefficients import shown_units

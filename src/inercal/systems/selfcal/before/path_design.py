@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.search import Designed
-from inercal.foundation.estimate.executors import Executor
 from inercal.foundation.findings import Finding
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
 from inercal.systems.selfcal.before.left_out import left_out, shifts

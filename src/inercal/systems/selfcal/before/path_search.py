@@ -16,9 +16,9 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.search import from_starts, improved
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.executors import Executor
 from inercal.systems.selfcal.before.bounds import PathBounds, bounds
 from inercal.systems.selfcal.before.left_out import LeftOut, left_out, shifts
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.consistency import nis, surprising, whiteness
+from inercal.foundation.inference.consistency import nis, surprising, whiteness
 from inercal.systems.selfcal.filters.averaged import averaged, block
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.estimate.hypotheses import Hypothesis, tried
 from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.geometry.rotations import (
     Axis,
@@ -30,6 +29,7 @@ from inercal.foundation.geometry.rotations import (
     multiply,
     rotate,
 )
+from inercal.foundation.inference.hypotheses import Hypothesis, tried
 from inercal.foundation.records.checks.values import saturated
 from inercal.systems.selfcal.diagnosis.fit_quality import Case
 from inercal.systems.selfcal.filters.residuals import gimbals

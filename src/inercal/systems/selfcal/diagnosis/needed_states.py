@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from inercal.foundation.estimate.consistency import whiteness
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.consistency import whiteness
 from inercal.foundation.units import parse_quantity
 from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
 from inercal.systems.selfcal.filters.filter_result import FilterResult

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.consistency import slow_power, whiteness
-from inercal.foundation.estimate.hypotheses import sigmas
 from inercal.foundation.findings import EVERYTHING, Finding, with_alternatives
+from inercal.foundation.inference.consistency import slow_power, whiteness
+from inercal.foundation.inference.hypotheses import sigmas
 from inercal.foundation.records.places import places
 from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
 from inercal.systems.selfcal.diagnosis.needed_states import Explained, needed_states

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Fitted, Hypothesis
+from inercal.foundation.inference.hypotheses import Fitted, Hypothesis
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.systems.selfcal.before.considered import innovation_slopes
 from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, regular

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.consistency import surprising
-from inercal.foundation.estimate.hypotheses import Hypothesis
 from inercal.foundation.findings import EVERYTHING
 from inercal.foundation.geometry.rotations import boxminus, conjugate, rotate
+from inercal.foundation.inference.consistency import surprising
+from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.foundation.records.places import counted, places
 from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered
 from inercal.systems.selfcal.filters.filter_result import FilterResult

@@ -1,6 +1,6 @@
 """Constant errors that the model leaves out, found in the innovations of the error-state filter.
 
-Each is a hypothesis with some parameters, tested by the score test (`inercal.foundation.estimate.hypotheses`): the
+Each is a hypothesis with some parameters, tested by the score test (`inercal.foundation.inference.hypotheses`): the
 filter with them as further states, without a prior, would find the same. Systematic inputs are fitted along with all,
 each with its stated uncertainty for a prior.
 """
@@ -16,10 +16,10 @@ from functools import partial
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Fits, Fitted, Hypothesis, refitted, search, sigmas, tried
 from inercal.foundation.findings import EVERYTHING
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import boxminus
+from inercal.foundation.inference.hypotheses import Fits, Fitted, Hypothesis, refitted, search, sigmas, tried
 from inercal.foundation.records.places import counted
 from inercal.systems.selfcal.diagnosis.fit_quality import JUDGE, Case, filtered, once, regular, short
 from inercal.systems.selfcal.diagnosis.rig_errors import columns_of, kept, rig_errors

@@ -16,7 +16,7 @@ from inercal.systems.selfcal.platform.coefficients import shown_units
 from inercal.systems.selfcal.result.tables import bounds_by_path, paths, turns, weak_combinations
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.selfcal.before.path_design import DesignedPath
     from inercal.systems.selfcal.settings import SelfcalSettings
 

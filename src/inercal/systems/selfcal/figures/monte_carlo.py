@@ -13,13 +13,13 @@ from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Pane
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, INK, QUIET
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.coverage import Coverage
+from inercal.foundation.inference.coverage import Coverage
 from inercal.systems.selfcal.estimators import ESTIMATORS
 from inercal.systems.selfcal.figures.design import facts
 from inercal.systems.selfcal.result.tables import campaign_table
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.selfcal.monte_carlo import Campaign
     from inercal.systems.selfcal.settings import SelfcalSettings
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.kalman import Row, empty_row, innovation_variance, scalar_update
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize
+from inercal.foundation.inference.kalman import Row, empty_row, innovation_variance, scalar_update
 from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.systems.selfcal.filters.problem import (
     FilterModel,

@@ -22,8 +22,9 @@ import numpy as np
 
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.factor import FACTORS
-from inercal.foundation.estimate.sigma_point import (
+from inercal.foundation.geometry.kernels import Vector
+from inercal.foundation.inference.factor import FACTORS
+from inercal.foundation.inference.sigma_point import (
     draw,
     empty_moments,
     empty_points,
@@ -31,7 +32,6 @@ from inercal.foundation.estimate.sigma_point import (
     update,
     weights,
 )
-from inercal.foundation.geometry.kernels import Vector
 from inercal.systems.selfcal.estimators import FACTOR_OF
 from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate

@@ -22,8 +22,9 @@ import numpy as np
 
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.factor import FACTORS
-from inercal.foundation.estimate.sigma_point import (
+from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
+from inercal.foundation.inference.factor import FACTORS
+from inercal.foundation.inference.sigma_point import (
     covariance,
     cross,
     draw,
@@ -32,7 +33,6 @@ from inercal.foundation.estimate.sigma_point import (
     update,
     weights,
 )
-from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, multiply, normalize, rotate
 from inercal.systems.selfcal.estimators import FACTOR_OF
 from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate

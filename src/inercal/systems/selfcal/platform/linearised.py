@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation._jit import kernel, merged
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.kalman import Row
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
+from inercal.foundation.inference.kalman import Row
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.kinematics import Axes, joint_axes, unit
 from inercal.systems.selfcal.platform.layout import Layout

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeA, TypeB
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.foundation.units import parse_quantity, parse_unit
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.considered import sensitivities

@@ -1,7 +1,7 @@
 """Errors of the rig that are neither states nor stated: what this recording leaves of them, in u.
 
 A K2, a harmonic or a bias that wanders may shift coefficients by several u before any test finds it. Each is as large
-as usual, or smaller where the innovations say so (`inercal.foundation.estimate.effects`): score and information follow
+as usual, or smaller where the innovations say so (`inercal.foundation.inference.effects`): score and information follow
 from the columns that the errors would have as states. Only where the states are those of a rig: a model of the
 literature is taken at its word, and a finding says what that leaves out.
 """
@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeB
-from inercal.foundation.estimate.effects import joint_second_moment
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.effects import joint_second_moment
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted_names
+from inercal.foundation.results.budget import TypeB
 from inercal.systems.selfcal.before.considered import both
 from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, regular
 from inercal.systems.selfcal.filters.averaged import averaged

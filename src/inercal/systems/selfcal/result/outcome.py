@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.basis import conditions_of, studied
-from inercal.foundation.estimate.budget import BudgetItem, combine
-from inercal.foundation.estimate.consistency import Nis, nis
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.identifiability import HALF_SEEN, UNSEEN
-from inercal.foundation.estimate.remarks import at_prior, exact_inputs, missed, reached, singular
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Status, causes
+from inercal.foundation.inference.consistency import Nis, nis
+from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN
 from inercal.foundation.records.places import counted
+from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.budget import BudgetItem, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, reached, singular
+from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.observability import Observability, not_positive, observability, useless
 from inercal.systems.selfcal.diagnosis.fit_quality import filtered as judging

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Hypothesis
+from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.systems.selfcal.diagnosis.fit_quality import Case
 from inercal.systems.selfcal.platform.states import UNIT_OF
 from inercal.systems.selfcal.settings import SelfcalSettings

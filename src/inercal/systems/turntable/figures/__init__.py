@@ -23,7 +23,7 @@ from inercal.systems.turntable.regression import Regression
 from inercal.systems.turntable.steps.calibration import StepCalibration
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.turntable.positions.calibration import PositionCalibration
     from inercal.systems.turntable.readings import Readings
 

@@ -13,13 +13,13 @@ from inercal.faces.report.html import page as framed
 from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres, plane
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.rounding import rounded
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.rounding import rounded
 from inercal.foundation.rigs.outputs import gravity_reference
 from inercal.systems.turntable.figures.table import factor_rows, rig, rig_facts
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.turntable.positions.planning import DesignedPositions
     from inercal.systems.turntable.settings import TurntableSettings
 

@@ -22,7 +22,7 @@ from inercal.systems.turntable.figures.table import factor_rows, rig, rig_facts
 from inercal.systems.turntable.sensitivity.analysis import result as analysis_result
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.turntable.sensitivity.analysis import Analysed
     from inercal.systems.turntable.settings import TurntableSettings
 

@@ -19,7 +19,7 @@ from inercal.systems.turntable.figures.table import factor_rows, rig, rig_facts
 from inercal.systems.turntable.positions.tolerance_result import factor_text, goal_texts, result, size_text
 
 if TYPE_CHECKING:
-    from inercal.foundation.estimate.result import Estimate
+    from inercal.foundation.results.result import Estimate
     from inercal.systems.turntable.positions.tolerance_design import ToleranceDesign
     from inercal.systems.turntable.settings import TurntableSettings
 

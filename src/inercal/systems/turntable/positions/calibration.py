@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.positions.fit import Fitting, fit_readings
 from inercal.systems.turntable.positions.outcome import assemble

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeA
-from inercal.foundation.estimate.variances import degrees
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.variances import degrees
+from inercal.foundation.results.budget import TypeA
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.positions.faults import fraction
 from inercal.systems.turntable.readings import Readings

@@ -4,7 +4,7 @@ A fault with columns Z changes the readings by Z theta. Where it is fitted besid
 anew, and C is the covariance of theta, ``theta^T C^-1 theta / m`` follows F(m, nu) in a sound test: exactly where there
 is noise alone, and as nearly as Welch and Satterthwaite's nu says where the stated errors of the table cause a part.
 The same risk, divided by the number of faults, holds for each. Candidates come from
-`inercal.foundation.estimate.hypotheses`, ranked by their score, which costs no fit.
+`inercal.foundation.inference.hypotheses`, ranked by their score, which costs no fit.
 
 A fault that is not significant may be there all the same. A test whose fault has the chance p supports it by
 ``1 / (-e p ln p)`` at most (Sellke, Bayarri and Berger, The American Statistician 55 (2001) 62), so that with the odds
@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Fits, Hypothesis, search
+from inercal.foundation.inference.hypotheses import Fits, Hypothesis, search
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.positions.faults import Fault, faults, reading
 from inercal.systems.turntable.readings import Readings

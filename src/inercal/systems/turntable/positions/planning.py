@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.allowed import insensitive, within
 from inercal.foundation.designs.candidates import Candidates
 from inercal.foundation.designs.comparison import PlanFigures, judge
@@ -18,7 +19,6 @@ from inercal.foundation.designs.criteria import Criterion, D, a_criterion, i_cri
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.executors import Executor
 from inercal.foundation.findings import Finding
 from inercal.foundation.rigs.outputs import table_outputs
 from inercal.foundation.rigs.plans import Plan, named

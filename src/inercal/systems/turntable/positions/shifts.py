@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.budget import TypeB
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.places import counted
+from inercal.foundation.results.budget import TypeB
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.positions.examination import Examination, Seen, Tested

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.identifiability import Identifiability, in_words
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.inference.identifiability import Identifiability, in_words
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.rate.cross_axis import axis_about, excess_across, fit_across

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.identifiability import Identifiability, identify
+from inercal.foundation.inference.identifiability import Identifiability, identify
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.noise import ReadingNoise, scatter
 from inercal.systems.turntable.rate.linearity import Deviations, Largest, drawn_errors, largest

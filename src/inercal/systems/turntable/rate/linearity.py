@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.result import COVERAGE
+from inercal.foundation.results.result import COVERAGE
 from inercal.systems.turntable.rate.stays import Effect
 
 _DRAWS = 4000

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.computing.executors import Executor
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.executors import Executor
-from inercal.foundation.estimate.rounding import concise
-from inercal.foundation.estimate.table import aligned
 from inercal.foundation.records.places import counted
+from inercal.foundation.results.rounding import concise
+from inercal.foundation.results.table import aligned
 from inercal.foundation.rigs.outputs import table_outputs
 from inercal.foundation.sensitivities import averages
 from inercal.foundation.sensitivities.averages import Averages, Flag

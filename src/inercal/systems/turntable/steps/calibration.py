@@ -8,9 +8,9 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
+from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.outputs import gravity_reference
 from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.limits import LIMITS

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.basis import Basis, conditions_of, studied
-from inercal.foundation.estimate.budget import TypeA, TypeB, combine
-from inercal.foundation.estimate.formula import Formula
-from inercal.foundation.estimate.result import Estimate
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.result import Estimate
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import FRAME
 from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term

@@ -2,7 +2,7 @@
 
 Wrong signs, units and axes were found before the fit (`inercal.systems.imu.aided.diagnosis.gross`). Each
 pattern (`inercal.systems.imu.aided.diagnosis.small`) is tested as an added variable, the score test of
-`inercal.foundation.estimate.hypotheses`: by how much the weighted sum of squares falls if its amplitudes are estimated
+`inercal.foundation.inference.hypotheses`: by how much the weighted sum of squares falls if its amplitudes are estimated
 with all the rest.
 """
 
@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import search
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.hypotheses import search
 from inercal.systems.imu.aided.diagnosis.fit_quality import mean_bias, variation, whitening
 from inercal.systems.imu.aided.diagnosis.small import constant_errors
 from inercal.systems.imu.aided.fit import Fit, noise_of

@@ -14,9 +14,9 @@ from functools import partial
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.estimate.hypotheses import Fitted, Hypothesis
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import Axis, elementary
+from inercal.foundation.inference.hypotheses import Fitted, Hypothesis
 from inercal.foundation.rigs.chain import Chain, Fixed, Joint
 from inercal.systems.imu.aided.diagnosis.fit_quality import Whitening, without_patterns
 from inercal.systems.imu.aided.diagnosis.gross import expected

@@ -1,0 +1,1 @@
+"""Many runs: workers, checkpoints, clusters."""

@@ -1,0 +1,1 @@
+"""Inference: least squares, filters' parts, variances, identifiability, coverage, hypotheses."""

@@ -1,0 +1,1 @@
+"""The one result: estimate, basis, budget, files, comparison of results."""

@@ -1,0 +1,1 @@
+"""Before a test: bounds, plans, foresight."""

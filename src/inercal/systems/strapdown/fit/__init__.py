@@ -1,0 +1,1 @@
+"""Coefficients from rests and turns: the batch, the filter, and how they begin."""

@@ -1,0 +1,1 @@
+"""Model of a strapdown unit: from samples to rate and specific force."""

@@ -1,0 +1,1 @@
+"""Noise that a recording shows, and effects outside the model."""
