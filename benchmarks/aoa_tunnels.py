@@ -19,7 +19,7 @@ import numpy as np
 from independent.aoa import AXES, CASES, DEG, DELAYS, G, R, Tunnel, simulate
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.systems.aoa.diagnosis.choice import decided
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem

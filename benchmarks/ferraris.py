@@ -18,7 +18,7 @@ from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris

@@ -22,7 +22,7 @@ from independent import imu
 
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.record import record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.settings import ImuSettings

@@ -33,11 +33,10 @@ import sensitivity
 from inercal.examples import FOLDER
 from inercal.faces.report.style import COLOURS, figure, powers_of_ten, svg
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.foundation.designs.candidates import Candidates
+from inercal.foundation.designs.candidates import NAMES, Candidates, basis
 from inercal.foundation.designs.criteria import D
 from inercal.foundation.designs.exchange import exchange
-from inercal.foundation.designs.spherical import NAMES, basis
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.noise.deviation import allan_deviation
 from inercal.foundation.records.read import read
 from inercal.foundation.rigs.chain import Chain, Error

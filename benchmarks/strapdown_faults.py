@@ -21,7 +21,7 @@ from campaigns.places import add_options, answers, in_words
 from independent import strapdown
 
 from inercal.foundation.findings import CODES, Harm, Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.record import record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Prior, Rests, StrapdownSettings

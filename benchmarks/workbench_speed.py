@@ -24,7 +24,7 @@ from inercal.bench.workbench.charts import figure
 from inercal.bench.workbench.plans import named
 from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
-from inercal.faces.python.foresight import course, foresight
+from inercal.faces.python.beginning import course, foresight
 from inercal.faces.python.study import read_study
 from inercal.faces.studies.text import with_keys
 from inercal.systems.listed import SYSTEMS

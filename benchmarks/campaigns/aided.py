@@ -6,8 +6,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.tables import turntable

@@ -9,7 +9,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 from inercal.systems.imu.ferraris.simulate import Session, simulate_session, true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings

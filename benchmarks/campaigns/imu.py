@@ -6,7 +6,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate

@@ -11,7 +11,7 @@ import numpy as np
 
 from campaigns import imu as by_hand
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record

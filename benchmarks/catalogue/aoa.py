@@ -14,7 +14,7 @@ from aoa_tunnels import STUDY, cases
 from independent.aoa import CASES, DEG, G, Run, Tunnel, simulate
 
 from inercal.foundation.errors import InputError
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.simulate import to_record
 from inercal.systems.aoa.task import measure

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.foundation.geometry.earth import gravity
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site, gravity
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.figures import relative_errors

@@ -7,7 +7,7 @@ import pytest
 from sting_study import DEG, NOISE, layout
 
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.paper.frequency import oscillation_frequency
+from inercal.systems.aoa.paper.lever import oscillation_frequency
 
 THREE = layout()
 

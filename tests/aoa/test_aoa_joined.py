@@ -12,8 +12,7 @@ from test_aoa_runs import STUDY
 from inercal.cli import run
 from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.records.write import write_record
-from inercal.systems.aoa.reading.recording import plain
-from inercal.systems.aoa.reading.triggers import triggered
+from inercal.systems.aoa.reading.recording import plain, triggered
 from inercal.systems.aoa.result.balance import clock_offset, join, read_balance
 from inercal.systems.aoa.result.points import points
 from inercal.systems.aoa.settings import MotionPlan, PointPlan

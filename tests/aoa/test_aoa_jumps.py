@@ -14,9 +14,8 @@ from inercal.cli import run
 from inercal.foundation.records.write import write_record
 from inercal.systems.aoa.disturbances import Disturbances
 from inercal.systems.aoa.paper.delay import relative_delay
-from inercal.systems.aoa.paper.frequency import oscillation_frequency
-from inercal.systems.aoa.paper.lever import zero_phase
-from inercal.systems.aoa.reading.clock import shortened, usual_step
+from inercal.systems.aoa.paper.lever import oscillation_frequency, zero_phase
+from inercal.systems.aoa.reading.recording import shortened, usual_step
 from inercal.systems.aoa.simulate import simulate, to_record
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="limits of memory as on POSIX")

@@ -9,7 +9,7 @@ import pytest
 from sting_study import DEG, G, scenario, study
 
 from inercal.foundation.findings import Finding, Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.files import from_json, to_json
 from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.angles import Angles

@@ -9,9 +9,9 @@ from sting_study import DEG
 from inercal.foundation.arrays import remembered
 from inercal.systems.aoa.angles import unwrapped
 from inercal.systems.aoa.paper.delay import _moved
-from inercal.systems.aoa.reading import clock, pauses
-from inercal.systems.aoa.reading.clock import in_time, later
-from inercal.systems.aoa.reading.recording import plain
+from inercal.systems.aoa.reading import pauses
+from inercal.systems.aoa.reading import recording as clock
+from inercal.systems.aoa.reading.recording import in_time, later, plain
 from rows import for_each
 
 

@@ -9,7 +9,7 @@ from sting_study import DEG, NOISE, G, study
 
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.files import save
 from inercal.foundation.results.result import Estimate

@@ -14,8 +14,8 @@ from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.diagnosis.choice import decided, of_vibration
 from inercal.systems.aoa.diagnosis.examination import diagnose, implausible
 from inercal.systems.aoa.diagnosis.gyro_scale import alone
-from inercal.systems.aoa.diagnosis.rectification import of_rectification
 from inercal.systems.aoa.diagnosis.small import further_ahead, with_axis
+from inercal.systems.aoa.diagnosis.spectrum import of_rectification
 from inercal.systems.aoa.diagnosis.unseen import unseen
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem

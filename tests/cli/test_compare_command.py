@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inercal.cli import run
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.files import load, save
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate

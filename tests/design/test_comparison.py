@@ -6,10 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import RATES, TERMS, drift, from_monomials, gravity, with_rates
 
-from inercal.foundation.designs.candidates import Candidates, plain
-from inercal.foundation.designs.comparison import judge
-from inercal.foundation.designs.criteria import D, a_criterion, i_criterion
-from inercal.foundation.designs.spherical import NAMES, basis
+from inercal.foundation.designs.candidates import NAMES, Candidates, basis, plain
+from inercal.foundation.designs.criteria import D, a_criterion, i_criterion, judge
 from inercal.foundation.geometry.rotations import elementary
 from inercal.foundation.rigs.plans import grid, named
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.inference.identifiability import learned
 from inercal.foundation.results.budget import TypeB, combine
 from inercal.foundation.results.remarks import (

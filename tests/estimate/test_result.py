@@ -12,7 +12,7 @@ from scipy import stats
 from inercal.foundation.errors import CalibrationError
 from inercal.foundation.findings import Status
 from inercal.foundation.results.result import Estimate, Parameter, coverage_factor
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from rows import for_each
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 
 MAGNITUDES = st.builds(
     lambda digits, power: float(f"{digits}e{power}"), st.floats(1.0, 9.9), st.integers(-320, 307)

@@ -1,6 +1,6 @@
 """Tables of texts: columns stand below each other, words from the left and numbers to the right."""
 
-from inercal.foundation.results.table import Table, aligned, heads
+from inercal.foundation.results.shown import Table, aligned, heads
 
 ROWS = (("", "value", "unit"), ("K0_x", "-1.25", "µg"), ("K1", "3", "1"))
 

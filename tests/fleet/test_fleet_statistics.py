@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import binom, binomtest
 
 from inercal.laboratory.fleet.capability import Share, spreads
-from inercal.laboratory.fleet.fleet import TREND_RISK, fleet_of
-from inercal.laboratory.fleet.outliers import RISK, distances, limit
+from inercal.laboratory.fleet.fleet import RISK, TREND_RISK, distances, fleet_of, limit
 from inercal.laboratory.fleet.unit import Coefficient, Row
 from inercal.laboratory.specification import specification_of
 

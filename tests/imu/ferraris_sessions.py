@@ -8,7 +8,7 @@ import numpy as np
 
 from inercal.examples import FOLDER
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record

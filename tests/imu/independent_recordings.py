@@ -6,7 +6,7 @@ import numpy as np
 from independent import imu
 from recordings import record_of
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.multiposition.calibration import MultipositionCalibration, calibrate_multiposition
 from inercal.systems.imu.settings import ImuSettings
 

@@ -16,7 +16,7 @@ from inercal.foundation._toml import check
 from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.inference.coverage import coverage
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record

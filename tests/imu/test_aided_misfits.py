@@ -14,8 +14,7 @@ from inercal.faces.studies.imu import AidedTable
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.records.record import Record
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.tables import turntable

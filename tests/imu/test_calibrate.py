@@ -8,8 +8,8 @@ from recordings import arrays, record_of, shipped
 
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.geometry.rotations import conjugate, exp, rotate
-from inercal.foundation.geometry.site import GravityInput, Site
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
 from inercal.systems.imu.multiposition.poses import sweep
 from inercal.systems.imu.recording import prepare

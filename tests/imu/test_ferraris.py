@@ -15,8 +15,7 @@ from ferraris_sessions import SETTINGS, session, with_values
 from inercal.faces.convert.correct import imu_model
 from inercal.foundation.computing.runs import run
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.inference.coverage import coverage
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.units import parse_unit

@@ -9,8 +9,8 @@ from scipy.io import loadmat
 
 from inercal.faces.report.html import render
 from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.geometry.rotations import conjugate, exp
-from inercal.foundation.geometry.site import GravityInput, Site
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from recordings import shipped
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
 from inercal.systems.imu.multiposition.calibration import MultipositionCalibration

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recordings import arrays, record_of
 
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
 from inercal.systems.imu.multiposition.gyro import _excess
 from inercal.systems.imu.settings import ImuSettings

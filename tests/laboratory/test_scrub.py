@@ -21,15 +21,13 @@ from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import instruments, results, show, values_of
 from inercal.laboratory.certificate.reading import certificate_of
 from inercal.laboratory.certificate.written import certificate
-from inercal.laboratory.chain import digest_of, happened
 from inercal.laboratory.check import check
 from inercal.laboratory.database import writing
-from inercal.laboratory.issue import issuing
+from inercal.laboratory.issue import issuing, supersede
 from inercal.laboratory.keep import Item, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.scrub import scrub
-from inercal.laboratory.store import make_store, open_store
-from inercal.laboratory.supersede import supersede
+from inercal.laboratory.store import digest_of, happened, make_store, open_store
 from inercal.laboratory.tables import Base, Event
 from rows import for_each
 

@@ -25,10 +25,10 @@ from inercal.laboratory.carry import export_store, import_store
 from inercal.laboratory.catalog import find, instruments, results, show, values_of
 from inercal.laboratory.check import check
 from inercal.laboratory.database import VERSION, migrate
+from inercal.laboratory.issue import supersede
 from inercal.laboratory.keep import Item, item_of, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.store import make_store, open_store, upgrade_store
-from inercal.laboratory.supersede import supersede
 
 TABLES = ("recording", "result", "source", "coefficient", "supersession", "event")
 
@@ -445,7 +445,7 @@ def test_what_is_no_store_is_refused(tmp_path):
 
 
 def test_passwords_are_not_shown():
-    from inercal.laboratory.place import place_of
+    from inercal.laboratory.store import place_of
 
     place = place_of("postgresql://lab:secret@host/name")
     assert place.shown == "postgresql://lab:***@host/name"

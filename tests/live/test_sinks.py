@@ -15,7 +15,7 @@ from inercal.bench.live import sinks
 from inercal.bench.live.address import sink_of, source_of
 from inercal.bench.live.counts import Spread, Stamps
 from inercal.bench.live.measurement import Measurement, Plan, measure
-from inercal.bench.live.rows import Row, payload
+from inercal.bench.live.pieces import Row, payload
 from inercal.bench.live.sinks import Outlet
 from inercal.faces.python.study import study_of
 from inercal.faces.stream.estimators import of_study

@@ -9,8 +9,7 @@ from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
-from inercal.foundation.noise.outcome import noise_of
-from inercal.foundation.noise.rest import unrest
+from inercal.foundation.noise.outcome import noise_of, unrest
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.files import load, save

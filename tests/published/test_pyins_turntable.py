@@ -18,7 +18,7 @@ from inercal.faces.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.read import read
 from inercal.systems.imu.aided.calibration import calibrate_aided
 from inercal.systems.imu.settings import ImuSettings

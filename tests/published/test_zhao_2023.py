@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
 from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import table_outputs

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from inercal.faces.report.formulas import clauses
-from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.basis import Formula
 from rows import for_each
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.distribution import normal, uniform

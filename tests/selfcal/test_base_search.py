@@ -13,9 +13,8 @@ from scipy.stats import chi2
 
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import gravity
+from inercal.foundation.geometry.earth import Site, gravity
 from inercal.foundation.geometry.rotations import exp, to_matrix
-from inercal.foundation.geometry.site import Site
 from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate

@@ -8,7 +8,7 @@ import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
 from inercal.foundation.findings import Finding, Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.files import to_json
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.simulate import experiment, simulate

@@ -10,9 +10,8 @@ from paper_study import study
 import inercal as ic
 from inercal.foundation.errors import StudyError
 from inercal.systems.selfcal.before.bounds import bounds
-from inercal.systems.selfcal.before.left_out import left_out, shifts
 from inercal.systems.selfcal.before.path_design import design
-from inercal.systems.selfcal.before.path_search import criterion, search
+from inercal.systems.selfcal.before.path_search import criterion, left_out, search, shifts
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from paper_study import DEG
 
-from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.geometry.kernels import exp, multiply, rotate
 from inercal.foundation.geometry.rotations import attitude_difference, elementary, from_matrix, to_matrix
-from inercal.foundation.geometry.site import Site
 from inercal.systems.selfcal.filters.residuals import gimbals as all_gimbals
 from inercal.systems.selfcal.platform.kinematics import all_angles, angles, attitude, joint_axes
 from inercal.systems.selfcal.platform.model import propagate

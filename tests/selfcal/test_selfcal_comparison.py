@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
 from inercal.foundation.findings import Status
+from inercal.foundation.geometry.earth import GravityInput
 from inercal.foundation.geometry.rotations import boxplus
-from inercal.foundation.geometry.site import GravityInput
 from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.figures import pictures
 from inercal.systems.selfcal.figures.filters import changes_of_turn

@@ -7,8 +7,7 @@ import pytest
 from paper_study import ARCSEC, DEG, TRUTH, study
 
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import GravityInput
+from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose

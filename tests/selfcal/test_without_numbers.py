@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, DEG, study
 
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput
+from inercal.foundation.geometry.earth import GravityInput
 from inercal.foundation.results.budget import combine
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.observability import not_positive

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.foundation.geometry.earth import gravity
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site, gravity
 from inercal.foundation.units import parse_quantity
 from inercal.systems.strapdown.fit.batch import fit
 from inercal.systems.strapdown.fit.rests import found_rests, nodes_of

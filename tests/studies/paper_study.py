@@ -5,8 +5,7 @@ from typing import get_args, get_type_hints
 
 import numpy as np
 
-from inercal.foundation.geometry.earth import gravity
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site, gravity
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.platform.plan import path as named_path
 from inercal.systems.selfcal.settings import Gating, Noise, SelfcalSettings

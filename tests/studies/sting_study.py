@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.systems.aoa.disturbances import Disturbances, Shaking
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.settings import AoaSettings, Calibration, Estimator, MotionPlan, Noise

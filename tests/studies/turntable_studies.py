@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
 from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.plans import grid, named

@@ -21,7 +21,7 @@ from turntable_studies import (
 
 from inercal.foundation.errors import CalibrationError, StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.records.column import Column
 from inercal.foundation.results.files import from_json, to_json
 from inercal.foundation.rigs.chain import Scope

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record

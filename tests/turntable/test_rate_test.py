@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record

@@ -19,7 +19,7 @@ from turntable_studies import (
     wheel_output,
 )
 
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.instruments.by_angle import CHANNELS
 from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.distribution import uniform

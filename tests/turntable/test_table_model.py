@@ -20,8 +20,7 @@ from turntable_studies import (
 )
 
 from inercal.foundation.errors import StudyError
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.instruments.by_angle import CHANNELS
 from inercal.systems.turntable.model import channels_of, table_model
 

@@ -17,7 +17,7 @@ from turntable_studies import (
     u_without_doubts,
 )
 
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.plans import grid

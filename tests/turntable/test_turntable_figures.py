@@ -10,11 +10,11 @@ from inercal.faces.report.html import render
 from inercal.faces.report.marks import Dots
 from inercal.faces.report.sphere import hemispheres
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import turntable

@@ -18,8 +18,7 @@ from turntable_studies import (
 )
 
 from inercal.foundation.findings import Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.records.record import record_of
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.plans import grid

@@ -5,7 +5,7 @@ import pytest
 
 from inercal.bench.workbench.plans import lines_of, named, with_found, with_lines
 from inercal.examples import FOLDER
-from inercal.faces.python.foresight import verticals
+from inercal.faces.python.beginning import verticals
 from inercal.faces.python.study import read_study
 from inercal.faces.studies.text import with_keys
 from inercal.foundation.errors import InputError

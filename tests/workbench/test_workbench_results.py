@@ -11,7 +11,7 @@ from inercal.examples import FOLDER
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
-from inercal.foundation.records.quiet import quiet
+from inercal.foundation.records.dwells import quiet
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from inercal.cli.options import FileOutput, StoreOption
 from inercal.cli.outcome import emit
 from inercal.foundation.errors import InputError
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned
 
 if TYPE_CHECKING:
     from inercal.foundation.results.result import Estimate
@@ -137,8 +137,7 @@ def _store(given: str | None) -> Store | None:
     """The store that is named, by option or environment, or the user's own where there is one."""
     import os
 
-    from inercal.laboratory.place import VARIABLE, place_of
-    from inercal.laboratory.store import open_store
+    from inercal.laboratory.store import VARIABLE, open_store, place_of
 
     folder = place_of(given).folder
     if (

@@ -12,7 +12,7 @@ from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit, say_findings
 from inercal.foundation.errors import InercalError, InputError
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned
 
 if TYPE_CHECKING:
     import subprocess
@@ -173,8 +173,8 @@ def supersede(
     """Say that a result takes the place of another."""
     from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.catalog import SHORT
+    from inercal.laboratory.issue import supersede as superseded
     from inercal.laboratory.store import open_store
-    from inercal.laboratory.supersede import supersede as superseded
 
     old, new = superseded(open_store(store), identity, by, reason)
     words = f"{old[:SHORT]} is superseded by {new[:SHORT]}: {reason}"
@@ -197,7 +197,7 @@ def rerun(
     from inercal.cli.stored_line import stored_line
     from inercal.foundation.results.files import from_json
     from inercal.foundation.results.result import without_coefficients
-    from inercal.foundation.results.rounding import rounded
+    from inercal.foundation.results.shown import rounded
     from inercal.laboratory.again import beside, laid_out, verdict
     from inercal.laboratory.catalog import SHORT
     from inercal.laboratory.catalog import show as shown

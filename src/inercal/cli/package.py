@@ -1,15 +1,33 @@
-"""``inercal examples``, ``schema`` and ``completion``: what comes with the package."""
+"""``inercal examples``, ``schema`` and ``completion``: what comes with the package.
+
+``inercal validate``.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from inercal.cli import show
-from inercal.cli.options import FileOutput
-from inercal.cli.outcome import emit
+from inercal.cli import process_age, show
+from inercal.cli.options import FileOutput, ResultOutput, reading
+from inercal.cli.outcome import WHOLE, emit, hand_over
 from inercal.foundation.errors import InputError
+
+
+def validate(*, output: ResultOutput = ResultOutput()) -> int:  # noqa: B008  (frozen)
+    """Rerun the published and closed-form cases."""
+    from inercal.faces.report.validation import page, table
+    from inercal.faces.validate.run import executor
+    from inercal.faces.validate.run import validate as run
+    from inercal.foundation._jit import compiling
+
+    output.check(WHOLE)
+    with compiling("validate", output.say), reading(output, "validating") as progress:
+        estimate = run(executor(), progress)
+    estimate = replace(estimate, timing={**estimate.timing, "total": process_age()})
+    return hand_over(estimate, [table(estimate)], lambda: page(estimate), output, "record")
 
 
 def examples(

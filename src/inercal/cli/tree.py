@@ -264,7 +264,7 @@ COMMANDS = {
         "inercal certificate cal.json --lab lab.toml --number 7 --out cal.xml",
     ),
     ("validate", ""): (
-        "inercal.cli.validate:validate",
+        "inercal.cli.package:validate",
         "Rerun the published and closed-form cases that ship with inercal, for the validation of software in a "
         "laboratory.\n\nOne line for each case: what was found, what was expected within which limit, and from which "
         "source. --out saves the record with versions (.json or .toml), --report writes a page to sign and to file. "

@@ -13,12 +13,10 @@ from typing import Any
 from sqlalchemy import Connection, Table, insert, select
 
 from inercal.foundation.errors import InputError
-from inercal.laboratory.chain import SCRUB, digest_of, happened, scrubbed, told
 from inercal.laboratory.check import check
 from inercal.laboratory.database import engine_of, migrate, reading, writing
 from inercal.laboratory.objects import Objects
-from inercal.laboratory.place import place_of
-from inercal.laboratory.store import Store, open_store
+from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
 from inercal.laboratory.tables import (
     Base,
     Certificate,

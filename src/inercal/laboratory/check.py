@@ -11,10 +11,9 @@ from sqlalchemy import Connection, select, text
 
 from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT
-from inercal.laboratory.chain import BEGIN, digest_of, hash_of, scrubbed, told
 from inercal.laboratory.database import reading
 from inercal.laboratory.keep import Rows, id_of
-from inercal.laboratory.store import Store
+from inercal.laboratory.store import BEGIN, Store, digest_of, hash_of, scrubbed, told
 from inercal.laboratory.tables import (
     Certificate,
     Certified,

@@ -17,11 +17,9 @@ from inercal.faces.report.style import ALARM, COLOURS, QUIET
 from inercal.foundation.arrays import Array
 from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.terms import term
-from inercal.foundation.results.basis import Basis
-from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned, rounded
 from inercal.laboratory.chart import LIMIT, Mask
 from inercal.laboratory.history import HORIZON, REFERENCES, YEAR, Course, History
 from inercal.laboratory.specification import group_of

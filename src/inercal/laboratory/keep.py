@@ -16,9 +16,8 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.inputs import program
 from inercal.foundation.results.files import plain_objects, to_json
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.chain import digest_of, happened, now
 from inercal.laboratory.database import reading, writing
-from inercal.laboratory.store import Store
+from inercal.laboratory.store import Store, digest_of, happened, now
 from inercal.laboratory.tables import Coefficient, Instrument, Recording, Reference, Result, SourceOf, Used
 
 LARGE = 1 << 30

@@ -18,12 +18,11 @@ from sqlalchemy import Connection, Table, Text, delete, select, update
 from inercal.foundation.addresses import holds_secret, without_login, without_secrets
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import plain_objects
-from inercal.laboratory.chain import BEGIN, SCRUB, digest_of, happened, hash_of
 from inercal.laboratory.check import check, digests_of
 from inercal.laboratory.database import vacuum, writing
 from inercal.laboratory.migrations.append_only import suspended
 from inercal.laboratory.objects import Objects
-from inercal.laboratory.store import Store
+from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
 from inercal.laboratory.tables import Base, Certificate, Event, Recording, Reference, Result, Setting, Used
 
 _APPEND_ONLY = (

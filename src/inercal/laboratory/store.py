@@ -1,16 +1,28 @@
-"""A store: made, opened, brought to the version of today."""
+"""A store: made, opened, brought to the version of today.
+
+The place of a store: a folder with ``store.db`` and ``objects``, or the URL of a database.
+
+Events of a store: a chain of hashes, so that whoever changes a row later is found out.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import os
+import re
 import sqlite3
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
 
-from sqlalchemy import Engine, insert, select
+from sqlalchemy import Connection, Engine, func, insert, select
 
-from inercal.foundation.addresses import holds_secret
+from inercal.foundation.addresses import holds_secret, shown_address
 from inercal.foundation.errors import InputError
-from inercal.laboratory.chain import digest_of, happened
 from inercal.laboratory.database import (
     VERSION,
     check_version,
@@ -21,8 +33,99 @@ from inercal.laboratory.database import (
     writing,
 )
 from inercal.laboratory.objects import Objects
-from inercal.laboratory.place import Place, place_of
-from inercal.laboratory.tables import Setting
+from inercal.laboratory.tables import Event, Setting
+
+BEGIN = "0" * 64
+"""Hash before the first event."""
+
+
+def now() -> str:
+    """The time, as a store writes it."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def digest_of(rows: Any) -> str:
+    """SHA-256 of rows, as JSON in one spelling."""
+    text = json.dumps(rows, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def hash_of(row: Mapping[str, Any]) -> str:
+    """Hash of an event: of all its fields but the hash itself, the hash of the event before among them."""
+    return digest_of({key: row[key] for key in ("number", "made", "kind", "subject", "digest", "previous")})
+
+
+SCRUB = "scrub"
+"""Kind of the event that says that secrets were taken out; ``scrub KIND`` says so of the subject of another event."""
+
+
+def told(events: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], str]:
+    """The digest of each kind and subject, as the last event tells it that added the rows or took a secret out."""
+    return {(row["kind"].removeprefix(f"{SCRUB} "), row["subject"]): row["digest"] for row in events}
+
+
+def scrubbed(events: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], str]:
+    """The day on which secrets were taken out of the rows of each kind and subject."""
+    return {
+        (row["kind"].removeprefix(f"{SCRUB} "), row["subject"]): row["made"][:10]
+        for row in events
+        if row["kind"].startswith(f"{SCRUB} ")
+    }
+
+
+def happened(connection: Connection, kind: str, subject: str, digest: str) -> None:
+    """Add an event, in a transaction that writes."""
+    number = connection.execute(select(func.max(Event.number))).scalar() or 0
+    previous = connection.execute(select(Event.hash).where(Event.number == number)).scalar() or BEGIN
+    row = {
+        "number": number + 1,
+        "made": now(),
+        "kind": kind,
+        "subject": subject,
+        "digest": digest,
+        "previous": previous,
+    }
+    connection.execute(insert(Event).values(**row, hash=hash_of(row)))
+
+
+VARIABLE = "INERCAL_STORE"
+"""Variable of the environment that says where the store is."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A store as it may be ``shown``, without secrets, and the URL of its database; ``folder`` where it is one."""
+
+    shown: str
+    url: str = field(repr=False)
+    folder: Path | None
+
+    @property
+    def given(self) -> str:
+        """The text by which another process finds the same place; it may hold a secret, and is shown nowhere."""
+        return self.url if self.folder is None else str(self.folder.absolute())
+
+
+def place_of(given: str | None, environment: Mapping[str, str] = os.environ) -> Place:
+    """The place that is given, else that of the environment, else ``store`` in the user's data folder.
+
+    Raises `InputError` for an empty text.
+    """
+    text = given if given is not None else environment.get(VARIABLE)
+    if text is None:
+        from platformdirs import user_data_path
+
+        text = str(user_data_path("inercal", appauthor=False) / "store")
+    if not text.strip() or "\0" in text:
+        raise InputError("--store", f"found {text!r}, expected a folder or the URL of a database")
+    if "://" in text:
+        return Place(shown_address(text), text, None)
+    if re.match(r"[A-Za-z][\w+.-]+:", text) and "@" in text:
+        raise InputError(
+            "--store", "found an address without ://, expected one such as postgresql://host/database"
+        )
+    folder = Path(text).expanduser()
+    return Place(str(folder), f"sqlite:///{folder.absolute() / 'store.db'}", folder)
 
 
 @dataclass(frozen=True)
@@ -45,7 +148,7 @@ def make_store(given: str | None = None, objects: str | None = None) -> Store:
     Parameters
     ----------
     given : str, optional
-        A folder, or the URL of an empty PostgreSQL database; as in `inercal.laboratory.place.place_of` if absent.
+        A folder, or the URL of an empty PostgreSQL database; as in `inercal.laboratory.store.place_of` if absent.
     objects : str, optional
         Folder or URL of the objects; within the folder if absent. A database needs it, and it is written there.
 

@@ -20,7 +20,7 @@ from inercal.bench.live.address import Sink, Source, sink_of, source_of
 from inercal.bench.live.counts import Counts, SinkCounts
 from inercal.bench.live.feed import Feed
 from inercal.bench.live.intake import Intake, is_datagrams, may_begin_within_a_row
-from inercal.bench.live.rows import Row, quantities_of
+from inercal.bench.live.pieces import Row, quantities_of
 from inercal.bench.live.sinks import Outlet, new_file
 from inercal.bench.live.watch import Quantity, Watch, Watched
 from inercal.faces.stream.lines import Lines

@@ -15,8 +15,7 @@ from typing import Any, Protocol
 from inercal.bench.live.address import Mqtt, Pieces, Sink, Text, Udp
 from inercal.bench.live.broker import Broker
 from inercal.bench.live.counts import SinkCounts, Spread
-from inercal.bench.live.pieces import PieceFiles
-from inercal.bench.live.rows import Row, payload
+from inercal.bench.live.pieces import PieceFiles, Row, payload
 from inercal.foundation.errors import InputError
 
 ROOM = 10_000

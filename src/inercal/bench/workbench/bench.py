@@ -17,11 +17,11 @@ import numpy as np
 from inercal.bench.workbench.jobs import Job, Queue
 from inercal.bench.workbench.measurements import MEASURED, Measurements
 from inercal.bench.workbench.sessions import MAP, PART, STUDY, Session, Sessions, put
-from inercal.faces.python.foresight import PLANNED
+from inercal.faces.python.beginning import PLANNED
 from inercal.foundation._files import read_bytes, write_text
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InercalError, InputError, plain, spelt
-from inercal.laboratory.place import VARIABLE
+from inercal.laboratory.store import VARIABLE
 from inercal.systems.listed import SYSTEMS
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Bench:
     def look(self, session: Session) -> tuple[Looked, ...]:
         """Read the recordings of a session, of each repeat run; raises `InputError`. Those of the last few are held."""
         from inercal.bench.workbench.charts import Notes, courses, marks_of
-        from inercal.foundation.records.quiet import quiet
+        from inercal.foundation.records.dwells import quiet
         from inercal.foundation.records.read import read_runs
 
         files = [*session.recordings, *filter(None, [session.map])]
@@ -149,7 +149,7 @@ class Bench:
 
         Raises `InputError`.
         """
-        from inercal.faces.python.foresight import foresight, verticals
+        from inercal.faces.python.beginning import foresight, verticals
         from inercal.faces.python.study import read_study
 
         if session.study is None:

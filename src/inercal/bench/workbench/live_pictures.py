@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.bench.workbench import interactive
 from inercal.faces.report.marks import Axis, Band, Line, Mark, Panel
-from inercal.foundation.results.rounding import rounded, short
+from inercal.foundation.results.shown import rounded, short
 
 POINTS = 1000
 """Points of a line at most: some of the pixels across a screen."""

@@ -20,9 +20,8 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import GYRO_G_SENSITIVITY, TERMS
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.read import source_of
-from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import STANDARD_GRAVITY
 

@@ -16,7 +16,7 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate, Parameter
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 
 if TYPE_CHECKING:
     import pandas

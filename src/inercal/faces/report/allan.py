@@ -18,8 +18,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.foundation.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.foundation.noise.outcome import ChannelNoise, Noise
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned, rounded
 from inercal.foundation.units import parse_unit
 
 #: symbol -> averaging time [s] at which it is read off its slope, the slope in words, the slope's colour

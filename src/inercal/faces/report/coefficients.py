@@ -15,7 +15,7 @@ from inercal.faces.report.style import ALARM, COLOURS, DIVERGING, INK, SEQUENTIA
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 
 _SMALL = 0.02
 """Share that a source reaches in no coefficient, to be drawn together with others of the kind."""

@@ -16,9 +16,7 @@ from inercal.faces.report.style import ALARM, COLOURS
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.shown import temperature
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned, rounded, temperature
 
 _FAR = 4.0
 """Normalised error beyond which the axis of the picture becomes logarithmic."""

@@ -15,7 +15,7 @@ from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Pane
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, INK, envelope, plain_unit
 from inercal.foundation.arrays import Array
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 
 _PIECES = 150
 """Pieces of a line in a small panel; it has at most twice as many points."""

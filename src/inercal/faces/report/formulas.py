@@ -6,7 +6,7 @@ import re
 from html import escape
 
 from inercal.faces.report.style import plain_unit
-from inercal.foundation.results.formula import Formula
+from inercal.foundation.results.basis import Formula
 
 _MATRIX = r"<mtable class='matrix'>\1</mtable>"
 

@@ -15,9 +15,7 @@ from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.budget import BudgetItem
 from inercal.foundation.results.files import plain_objects
 from inercal.foundation.results.result import Estimate, Parameter
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.shown import in_words
-from inercal.foundation.results.table import Table
+from inercal.foundation.results.shown import Table, in_words, rounded
 from inercal.foundation.units import parse_unit
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column, counted_rows
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.table import Table
+from inercal.foundation.results.shown import Table
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ROWS = re.compile(r"(?:.*, )?rows? ((?:\d+(?:-\d+)?(?:, )?)+)")

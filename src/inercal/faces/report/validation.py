@@ -8,7 +8,7 @@ from typing import Any
 
 from inercal.faces.report.html import page as template
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned
 
 _HEAD = ("", "case", "found", "expected", "", "unit", "source")
 _WORDS = (0, 1, 4, 5, 6)

@@ -22,8 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from inercal.faces.stream.aoa_sensors import Sensors, watched_limits
-from inercal.faces.stream.aoa_state import AoaState, Leaning, choice_of, chosen, kept
+from inercal.faces.stream.aoa_state import AoaState, Leaning, Sensors, choice_of, chosen, kept, watched_limits
 from inercal.faces.stream.lines import Lines, Sample
 from inercal.faces.stream.run import Alarms, Output, Slots
 from inercal.foundation.arrays import Array
@@ -38,8 +37,8 @@ from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.fusion.watch import ALL, ALL_COUNT, watched
 from inercal.systems.aoa.fusion.watch import initial as unwatched
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later as later_rows
 from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import later as later_rows
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
 from inercal.systems.aoa.result.carry_over import corrected
 from inercal.systems.aoa.result.carry_over import load as load_posterior

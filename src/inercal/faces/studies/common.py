@@ -11,8 +11,7 @@ from pydantic import BeforeValidator, Field
 from inercal.faces.studies.fields import QuantityText, Temperature
 from inercal.foundation._toml import Strict
 from inercal.foundation.errors import StudyError
-from inercal.foundation.geometry.earth import gravity, gravity_gradient
-from inercal.foundation.geometry.site import GravityInput, Site
+from inercal.foundation.geometry.earth import GravityInput, Site, gravity, gravity_gradient
 from inercal.foundation.units import Quantity
 
 GRAVITY_ANOMALY = 3.5e-4

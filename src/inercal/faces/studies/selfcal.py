@@ -47,7 +47,7 @@ from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.units import Quantity, parse_quantity
 from inercal.systems.selfcal.estimators import GONE
 from inercal.systems.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS

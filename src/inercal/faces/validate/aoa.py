@@ -10,7 +10,7 @@ import numpy as np
 from inercal.faces.studies.load import load_aoa_study
 from inercal.faces.validate.case import Case, record_of, study_of
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.units import parse_quantity
 from inercal.systems.aoa.angles import alpha_beta
 from inercal.systems.aoa.disturbances import Disturbances

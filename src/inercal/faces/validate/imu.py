@@ -15,7 +15,7 @@ from inercal.faces.studies.load import load_imu_study
 from inercal.faces.validate import rows
 from inercal.faces.validate.case import Case, record_of, study_of
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.ferraris.method import NAMES
 from inercal.systems.imu.ferraris.simulate import Session, quiet, simulate_session, true_values

@@ -6,7 +6,7 @@ import numpy as np
 
 from inercal.faces.validate.case import Case
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit

@@ -12,8 +12,8 @@ from inercal.faces.validate.case import Case
 from inercal.faces.validate.gyrowheel import TABLE, one_turntable_calibration, settings_of
 from inercal.faces.validate.table import TABLE_CASES
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.comparison import in_basis
-from inercal.foundation.designs.spherical import basis
+from inercal.foundation.designs.candidates import basis
+from inercal.foundation.designs.criteria import in_basis
 from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import gravity_reference, table_outputs
 from inercal.foundation.rigs.plans import grid

@@ -23,10 +23,9 @@ from inercal.foundation.errors import InputError, QuantityError
 from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.inference.identifiability import in_words
 from inercal.foundation.records.places import counted_names
-from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
 from inercal.foundation.results.common_sources import Taken, common_sources, other_instrument
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate, Parameter
 from inercal.foundation.units import parse_unit
 

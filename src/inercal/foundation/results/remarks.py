@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding, Status
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.inference.identifiability import Learned
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted_names

@@ -28,7 +28,7 @@ from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.files import plain_objects
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 
 SIGNIFICANCE = 1e-3
 """Probability, over all coefficients, below which chance is ruled out as the cause of differences between runs."""

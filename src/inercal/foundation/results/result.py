@@ -18,9 +18,14 @@ from inercal.foundation.instruments.terms import resting_on
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.results.basis import Basis, provenance
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.shown import budget_shown, in_words, statistics_in_words, units_shown
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import (
+    aligned,
+    budget_shown,
+    in_words,
+    rounded,
+    statistics_in_words,
+    units_shown,
+)
 
 
 def judged(

@@ -9,7 +9,7 @@ v_b; both carry the state (12,) of a random vector, for one is the transpose of 
     state[9:12]   the same vector on the rig without errors
 
 An error about axis a acts in the plane (b, c) of the two axes that follow a cyclically. With
-J = [[0, -1], [1, 0]] its rotation there is, in terms of `inercal.foundation.sensitivities.moments`,
+J = [[0, -1], [1, 0]] its rotation there is, in terms of `inercal.foundation.sensitivities.dense`,
 (1 - mean e) + (mean s) J + xi_1 (J + slope) + xi_2, with slope = cov(cos, sin) / var(sin). `ERROR_ROW` is the order
 of the five numbers in an array ``errors`` (k, 5).
 """

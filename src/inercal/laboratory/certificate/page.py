@@ -11,7 +11,7 @@ from inercal.faces.report.style import plain_unit
 from inercal.foundation.errors import QuantityError
 from inercal.foundation.instruments.dsi import dsi
 from inercal.foundation.instruments.terms import shown_unit
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.laboratory.certificate.elements import NAMESPACES
 from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, quantities_of, text
 

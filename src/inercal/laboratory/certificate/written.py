@@ -13,10 +13,9 @@ from inercal.foundation.findings import Status
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import shown
 from inercal.laboratory.certificate.administration import administrative
-from inercal.laboratory.certificate.conformity import limits_used, statement
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES, XSI, plain
 from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
-from inercal.laboratory.certificate.results import measured
+from inercal.laboratory.certificate.results import limits_used, measured, statement
 from inercal.laboratory.certificate.schema import VERSION, fault
 from inercal.laboratory.specification import Conformity, Specification, judged, specification_of
 

@@ -25,8 +25,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import shown_unit
-from inercal.foundation.results.rounding import short
-from inercal.foundation.results.table import Table, heads
+from inercal.foundation.results.shown import Table, heads, short
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
 from inercal.systems.aoa.fusion.problem import problem

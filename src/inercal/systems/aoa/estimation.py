@@ -12,7 +12,7 @@ from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.diagnosis.choice import of_delay
 from inercal.systems.aoa.diagnosis.effect import of_flexure
 from inercal.systems.aoa.diagnosis.examination import diagnose
-from inercal.systems.aoa.diagnosis.rectification import of_rectification
+from inercal.systems.aoa.diagnosis.spectrum import of_rectification
 from inercal.systems.aoa.diagnosis.unseen import unseen
 from inercal.systems.aoa.estimators import EstimatorKind
 from inercal.systems.aoa.fusion import filter_result, live_band, smoother

@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import StudyError
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     DEVIATION,
     FREQUENCY,

@@ -22,15 +22,14 @@ from inercal.systems.aoa.fusion.filter_result import FilterResult
 from inercal.systems.aoa.fusion.problem import FilterProblem, problem
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
 from inercal.systems.aoa.paper.methods import MEASURED, label, low_passed
-from inercal.systems.aoa.reading.clock import later
 from inercal.systems.aoa.reading.from_record import recording_of
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
 from inercal.systems.aoa.reference.sensor_fit import Verified, fit
 from inercal.systems.aoa.reference.static_fit import at_rests_alone, static_fit
-from inercal.systems.aoa.result.alarms import beyond_limits
 from inercal.systems.aoa.result.carry_over import corrected
 from inercal.systems.aoa.result.carry_over import load as load_posterior
+from inercal.systems.aoa.result.columns import beyond_limits
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
 from inercal.systems.aoa.result.points import Point, points
 from inercal.systems.aoa.result.verification import Errors, errors, late_reference

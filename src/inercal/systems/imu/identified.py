@@ -8,7 +8,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.inference.identifiability import WORST_BY_SIZE
 from inercal.foundation.inference.least_squares import NonlinearFit
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.imu.limits import LIMITS
 
 

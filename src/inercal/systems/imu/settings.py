@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, within
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.units import Quantity

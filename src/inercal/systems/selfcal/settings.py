@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     PART,
     REQUIRED,

@@ -13,8 +13,7 @@ import numpy as np
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded
-from inercal.foundation.results.table import Table
+from inercal.foundation.results.shown import Table, rounded
 from inercal.systems.selfcal.before import considered
 from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.diagnosis.examination import diagnose

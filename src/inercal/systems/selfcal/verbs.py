@@ -120,7 +120,7 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 def prepare_design(study: Study) -> None:
     """Load, or compile, the kernels of `design`."""
     from inercal.systems.selfcal.before.bounds import bounds
-    from inercal.systems.selfcal.before.left_out import left_out, shifts
+    from inercal.systems.selfcal.before.path_search import left_out, shifts
     from inercal.systems.selfcal.filters.problem import problem
     from inercal.systems.selfcal.platform.plan import Plan, Rest, motion
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.shown import in_words
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned, in_words
 from inercal.foundation.units import STANDARD_GRAVITY, Unit
 
 _ARCSEC = np.radians(1.0 / 3600.0)

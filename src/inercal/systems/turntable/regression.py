@@ -26,13 +26,13 @@ from inercal.foundation.inference.identifiability import Identifiability, few_te
 from inercal.foundation.instruments.polynomial import ChannelModel
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel
-from inercal.systems.turntable.noise import scatter
 from inercal.systems.turntable.second_order import SecondOrder, second_order
 from inercal.systems.turntable.weights import (
     Samples,
     Weights,
     beside_inputs,
     least_noise,
+    scatter,
     weights,
     weights_of,
     whitened,

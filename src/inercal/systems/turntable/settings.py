@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.designs.tolerances import Price
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     FREQUENCY,
     RATE,

@@ -33,7 +33,7 @@ from inercal.foundation._files import read_bytes
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.foresight import Foresight
 from inercal.foundation.errors import InercalError
-from inercal.foundation.results.rounding import short
+from inercal.foundation.results.shown import short
 from inercal.systems.contract import Plan
 from inercal.systems.listed import SYSTEMS
 

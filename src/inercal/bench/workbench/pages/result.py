@@ -31,7 +31,7 @@ from inercal.foundation._files import read_bytes
 from inercal.foundation.errors import InercalError
 from inercal.foundation.findings import Status
 from inercal.foundation.records.places import counted
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.listed import SYSTEMS
 from inercal.systems.strapdown.system import SYSTEM as STRAPDOWN
 

@@ -26,9 +26,14 @@ from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.diagnosis import gyro_scale
 from inercal.systems.aoa.diagnosis.noise_check import misstated
-from inercal.systems.aoa.diagnosis.rectification import with_offsets
-from inercal.systems.aoa.diagnosis.spectrum import highest_motion, lines, white_noise
-from inercal.systems.aoa.diagnosis.stretches import liveliest, part_of
+from inercal.systems.aoa.diagnosis.spectrum import (
+    highest_motion,
+    lines,
+    liveliest,
+    part_of,
+    white_noise,
+    with_offsets,
+)
 from inercal.systems.aoa.fusion import band as limiting
 from inercal.systems.aoa.fusion.filter_result import FilterResult
 from inercal.systems.aoa.fusion.loop import OUTPUTS
@@ -36,8 +41,7 @@ from inercal.systems.aoa.fusion.problem import FilterProblem, problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
-from inercal.systems.aoa.reading.clock import in_time
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, in_time
 from inercal.systems.aoa.settings import AoaSettings, Prior, Resonance
 
 DENSITIES = (1e9, 1e10, 1e11, 1e12)

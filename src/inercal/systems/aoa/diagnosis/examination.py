@@ -30,8 +30,7 @@ from inercal.systems.aoa.diagnosis.small import small_errors
 from inercal.systems.aoa.estimators import STATES
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 from inercal.systems.aoa.settings import AoaSettings
 
 #: number of states -> errors that fewer states leave out

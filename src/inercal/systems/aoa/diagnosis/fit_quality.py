@@ -16,8 +16,7 @@ from inercal.systems.aoa.fusion.loop import OUTPUTS
 from inercal.systems.aoa.fusion.problem import FilterProblem, problem
 from inercal.systems.aoa.fusion.run import State, advance, initial
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import in_time, later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, in_time, later
 from inercal.systems.aoa.settings import AoaSettings
 
 _BLOCK = 50

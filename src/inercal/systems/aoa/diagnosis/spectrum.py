@@ -1,13 +1,96 @@
-"""The spectra of the sensors: how far up the model's motion goes, and the lines that are no motion."""
+"""The spectra of the sensors: how far up the model's motion goes, and the lines that are no motion.
+
+Stretches of a recording by which the choices are made: the liveliest ones.
+
+Rectification: the offset that vibration makes of an accelerometer, by its second-order coefficient K2.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from dataclasses import replace
 
-from inercal.foundation.arrays import Array
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.foundation.arrays import Array, remembered
+from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, in_time, later
 from inercal.systems.aoa.settings import AoaSettings
+
+
+def of_rectification(recording: Recording, settings: AoaSettings, u: float) -> list[Finding]:
+    """``rectification``: vibration that by a common K2 makes an offset of the angle near its ``u`` [rad], without being
+    in it."""
+    stated, power = settings.noise.rectification, _vibration(recording)
+    k2 = stated or LIMITS.common_k2
+    off = k2 * power / STANDARD_GRAVITY
+    if settings.prior.rectified or not off > LIMITS.told_offset * u:
+        return []
+    advice = (
+        "band and snap are stated, so u has none of it"
+        if stated
+        else "write rectification under [noise], so that u has it"
+    )
+    text = (
+        f"sensors feel {math.sqrt(power) / STANDARD_GRAVITY:.2g} g rms above {LIMITS.lowest_line:g} Hz: a K2 of "
+        f"{1e6 * k2 * STANDARD_GRAVITY:.3g} ug/g^2 shifts the angle by {math.degrees(off):.2g} deg"
+    )
+    return [Finding("rectification", text, harm=EVERYTHING if off > u else (), action=advice)]
+
+
+def with_offsets(recording: Recording, settings: AoaSettings) -> AoaSettings:
+    """The study with what vibration may make of the stated K2, which lies anywhere up to it."""
+    k2 = settings.noise.rectification
+    if not k2:
+        return settings
+    offset = k2 * _vibration(recording) / math.sqrt(3.0)
+    return replace(settings, prior=replace(settings.prior, rectified=offset))
+
+
+def _vibration(recording: Recording) -> float:
+    """Mean square [m^2/s^4] above `Limits.lowest_line` in the liveliest stretch, of the accelerometer that feels most;
+    0 of a short recording."""
+    rows = next(iter(liveliest(recording)), None)
+    if rows is None:
+        return 0.0
+    frequency, density = powers(recording.t[rows], recording.acc[rows])
+    return float(density[frequency > LIMITS.lowest_line].sum(axis=0).max() * frequency[1])
+
+
+@remembered
+def liveliest(recording: Recording) -> tuple[NDArray[np.int64], ...]:
+    """Rows of the stretches in which readings differ most from one row to the next, the liveliest first."""
+    taken, t = later(recording.t), recording.t[in_time(recording.t)]
+    number = np.floor((t - t[:1]) / LIMITS.snap_time)
+    stretches = [
+        rows for rows in np.split(taken, np.flatnonzero(np.diff(number)) + 1) if _enough(recording, rows)
+    ]
+    sizes = [_restless(recording, rows) for rows in stretches]
+    return tuple(stretches[k].copy() for k in np.argsort(sizes)[::-1][: LIMITS.snap_stretches])
+
+
+def _enough(recording: Recording, rows: NDArray[np.int64]) -> bool:
+    """True for a stretch that goes on for twice the time in which a filter settles, in rows near enough for spectra."""
+    t = recording.t[rows]
+    if len(rows) < 4 or not np.ptp(t) > 2.0 * LIMITS.settling_time:
+        return False
+    return bool(4.0 * np.median(np.diff(t)) <= LIMITS.line_segment)
+
+
+def _restless(recording: Recording, rows: NDArray[np.int64]) -> float:
+    """Root mean square of the second differences of all readings of a stretch, without single wild ones."""
+    second = np.abs(np.diff(np.column_stack([recording.acc[rows], recording.gyro[rows]]), 2, axis=0))
+    finite = second[np.isfinite(second)]
+    return float(np.sqrt(np.mean(np.minimum(finite, np.quantile(finite, 0.99)) ** 2))) if finite.size else 0.0
+
+
+def part_of(recording: Recording, rows: NDArray[np.int64]) -> Recording:
+    """A stretch of a recording."""
+    columns = {name: getattr(recording, name)[rows] for name in ("t", "acc", "gyro", "turns", "zero_angle")}
+    return replace(recording, **columns, point=None, trigger=None, reference=None, masked=None)
 
 
 def powers(t: Array, values: Array) -> tuple[Array, Array]:

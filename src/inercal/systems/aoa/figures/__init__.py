@@ -33,8 +33,8 @@ from inercal.systems.aoa.angles import gives_alpha
 from inercal.systems.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
 from inercal.systems.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import settled
 from inercal.systems.aoa.reading.pauses import at_rest
+from inercal.systems.aoa.reading.recording import settled
 from inercal.systems.aoa.result.tables import answer, delays, displayed, on_page
 from inercal.systems.aoa.task import in_order
 

@@ -19,7 +19,7 @@ from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.figures import sensors
 from inercal.systems.aoa.layout import all_weights, centrifugal_arms, tangential_arms
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import settled
+from inercal.systems.aoa.reading.recording import settled
 from inercal.systems.aoa.result.outcome import term_of
 
 if TYPE_CHECKING:

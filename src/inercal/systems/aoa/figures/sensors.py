@@ -14,7 +14,7 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import UNSEEN
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.aoa.limits import LIMITS
 
 _USUAL = (5e-3, 5.0)

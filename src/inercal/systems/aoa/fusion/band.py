@@ -22,8 +22,7 @@ from inercal.systems.aoa.fusion.loop import BESIDE
 from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.fusion.problem import problem as problem_of
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later, usual_step
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later, usual_step
 from inercal.systems.aoa.settings import AoaSettings
 
 Array: TypeAlias = NDArray[np.float64]

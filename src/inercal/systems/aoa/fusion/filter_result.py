@@ -29,8 +29,7 @@ from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.fusion.run import Start, State, Trace, advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 
 KEPT = 2000
 """Number of rows, about, at which all states are kept for pictures."""

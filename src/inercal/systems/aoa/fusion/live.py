@@ -2,7 +2,7 @@
 
 The first rows are held until the filter can start (`Limits.starting_rows`), and where theta is lost rows are
 held again: their angles then come all at once. A row that is not later than those before it has no angle
-(`inercal.systems.aoa.reading.clock`); every row is answered, in the order in which it came.
+(`inercal.systems.aoa.reading.recording`); every row is answered, in the order in which it came.
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from inercal.systems.aoa.fusion.filter_result import roll_of
 from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
 from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later, set_back
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later, set_back
 
 
 class LiveState(NamedTuple):

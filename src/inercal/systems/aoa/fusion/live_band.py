@@ -23,7 +23,7 @@ from inercal.systems.aoa.fusion.loop import BESIDE, MOTION, OUTPUTS
 from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.fusion.watch import watched
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import set_back
+from inercal.systems.aoa.reading.recording import set_back
 
 _EMPTY = BandState(np.empty((0, 2, 0)), *np.empty((4, 0)))
 

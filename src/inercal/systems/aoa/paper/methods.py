@@ -20,8 +20,7 @@ from inercal.systems.aoa.paper.delay import aligned, relative_delay
 from inercal.systems.aoa.paper.lever import zero_phase
 from inercal.systems.aoa.paper.residuals import error_terms
 from inercal.systems.aoa.paper.static import spread
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 from inercal.systems.aoa.settings import AoaSettings, Methods
 
 LOW_PASS = 30.0

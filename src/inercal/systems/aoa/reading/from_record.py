@@ -17,8 +17,7 @@ from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.systems.aoa.angles import continuous
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import in_time, later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, in_time, later
 from inercal.systems.aoa.settings import GYROS, AoaSettings, Calibration
 
 Flags = NDArray[np.bool_]

@@ -20,9 +20,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
 from inercal.systems.aoa.layout import axes
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.means import mean_u
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later, mean_u
 from inercal.systems.aoa.settings import AoaSettings, Zero
 
 Indices = NDArray[np.int64]

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from inercal.foundation.errors import RecordError
 from inercal.foundation.records.dwells import breaks
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -23,8 +23,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.inference.identifiability import learned
 from inercal.foundation.inference.variances import Solved, solved
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.means import mean_u
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, mean_u
 from inercal.systems.aoa.reference.sensor_fit import Verified, fit_terms
 from inercal.systems.aoa.settings import AoaSettings
 

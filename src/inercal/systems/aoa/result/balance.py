@@ -25,9 +25,7 @@ from inercal.foundation.records.read import source_of
 from inercal.foundation.records.titles import name_and_unit
 from inercal.systems.aoa.angles import Angles, continuous
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later, usual_step
-from inercal.systems.aoa.reading.means import mean_u
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later, mean_u, usual_step
 from inercal.systems.aoa.result.points import Point
 
 _NUMBERS = ("point", "trigger")

@@ -26,8 +26,7 @@ from inercal.systems.aoa.fusion.problem import problem as stated_problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import later
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, later
 from inercal.systems.aoa.result.systematic import leaning, leans, uncertain_roll
 from inercal.systems.aoa.settings import AoaSettings
 

@@ -14,16 +14,14 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.geometry.rotations import principal
 from inercal.foundation.instruments.terms import Term, term
-from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import Uncertainty
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import FilterResult
 from inercal.systems.aoa.fusion.problem import FilterProblem
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.reading.clock import in_time
-from inercal.systems.aoa.reading.recording import Recording
+from inercal.systems.aoa.reading.recording import Recording, in_time
 from inercal.systems.aoa.reference.corrections import as_stated, report_of
 from inercal.systems.aoa.result import verdict
 from inercal.systems.aoa.result.budget import ANGLE, parts

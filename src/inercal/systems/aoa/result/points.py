@@ -2,7 +2,7 @@
 
 Errors of biases, positions and axes are the same in all rows of a pause: the mean of n rows is no better known than one
 of them, and its standard uncertainty is the mean of theirs. Noise and buffet add to it by the mean of rows that are
-correlated (`inercal.systems.aoa.reading.means`). A drift of the angle counts as scatter.
+correlated (`inercal.systems.aoa.reading.recording`). A drift of the angle counts as scatter.
 """
 
 from __future__ import annotations
@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
 from inercal.systems.aoa.angles import Angles, alpha_beta, unwrapped
-from inercal.systems.aoa.reading.means import mean_u
 from inercal.systems.aoa.reading.pauses import pauses
-from inercal.systems.aoa.reading.recording import Recording
-from inercal.systems.aoa.reading.triggers import triggered
+from inercal.systems.aoa.reading.recording import Recording, mean_u, triggered
 from inercal.systems.aoa.settings import AoaSettings
 
 Indices = NDArray[np.int64]
@@ -65,7 +63,7 @@ def points(recording: Recording, angles: Angles, settings: AoaSettings) -> tuple
 
     A point is a stretch with one number in the record's ``point`` column; the same number later is another point.
     Without that column a point is a pause of the angle itself (`inercal.systems.aoa.reading.pauses`). The study may ask
-    for one of these, or for those of the ``trigger`` (`inercal.systems.aoa.reading.triggers`). Rows without an angle
+    for one of these, or for those of the ``trigger`` (`inercal.systems.aoa.reading.recording`). Rows without an angle
     are left out, and end no point. Raises `RecordError` where the column that is asked for is missing.
     """
     by = settings.points.by

@@ -12,8 +12,7 @@ import numpy as np
 from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.instruments.terms import shown_unit, sized
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded, short
-from inercal.foundation.results.table import Table
+from inercal.foundation.results.shown import Table, rounded, short
 from inercal.systems.aoa.angles import gives_alpha
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reference.corrections import is_verified

@@ -13,8 +13,7 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.results.basis import studied
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.rounding import rounded, short
-from inercal.foundation.results.table import Table, heads
+from inercal.foundation.results.shown import Table, heads, rounded, short
 from inercal.systems.aoa.result.outcome import COMMAND, REFERENCES
 from inercal.systems.aoa.runs.run_table import Run, RunTable
 from inercal.systems.aoa.runs.summary import AtPoint, Oscillation

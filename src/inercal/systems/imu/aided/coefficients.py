@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.imu.aided.fit import Fit, Sensor

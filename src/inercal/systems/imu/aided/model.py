@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.rigs.chain import Scope
 from inercal.systems.imu.aided.blocks import Blocks, Reference
 from inercal.systems.imu.aided.table import Motion, error_nodes

@@ -10,7 +10,7 @@ import numpy as np
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_SIZE
 from inercal.foundation.records.places import counted, counted_names
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.foundation.units import RAW
 from inercal.systems.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.systems.imu.aided.diagnosis.examination import Misfit

@@ -2,7 +2,7 @@
 
 A hold is where the windowed variance of both sensors stays near that of the calmest part of the record. Which axis
 is upright shows without any calibration: of many holds, each axis lies level in most, so that the median of its means
-is its bias. Which of the motions are the turns is chosen in `inercal.systems.imu.ferraris.which_turn`.
+is its bias. Which of the motions are the turns is chosen in `inercal.systems.imu.ferraris.sections`.
 """
 
 from __future__ import annotations

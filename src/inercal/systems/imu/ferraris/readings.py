@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import EVERYTHING, Finding
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.noise.dwell_means import AllanFit, fit_pooled
 from inercal.foundation.records.column import Triad
 from inercal.systems.imu.ferraris.method import Inputs

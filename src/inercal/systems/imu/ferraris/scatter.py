@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.inference.least_squares import LinearFit, least_squares
 from inercal.systems.imu.ferraris.method import Matrices
 from inercal.systems.imu.ferraris.names import UP

@@ -1,10 +1,17 @@
-"""A gyro at known rates in unknown orientations: one record for each rate in, an estimate out."""
+"""A gyro at known rates in unknown orientations: one record for each rate in, an estimate out.
+
+An orientation that lies off all others: found, and named with what it does to the coefficients.
+
+Changes over the orientations: a bias that drifts, or a rate or scale factor that does, looked for in the residuals.
+
+Times are no part of rows of means, so that a trend goes with the number of the orientation, file after file.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,24 +19,105 @@ import numpy as np
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import EVERYTHING, Finding, Status
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate, timed
+from inercal.foundation.results.shown import rounded
 from inercal.systems.imu.identified import weakness
 from inercal.systems.imu.known_rates.fit import NAMES, RateFit, contradiction, fit_rates
 from inercal.systems.imu.known_rates.orientations import Orientations, orientations
-from inercal.systems.imu.known_rates.outlying import outlying, outlying_finding
-from inercal.systems.imu.known_rates.trend import trend_findings
-from inercal.systems.imu.known_rates.vector_sizes import PARAMETERS, SizeFit, curing
+from inercal.systems.imu.known_rates.vector_sizes import (
+    PARAMETERS,
+    SizeFit,
+    curing,
+    residual_rows,
+    without_rows,
+)
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import unit_words
 from inercal.systems.imu.settings import COMMAND, ImuSettings, KnownRatesSettings
+
+
+def trend_findings(rate_fit: RateFit, sizes: Array, u: Array) -> Iterator[Finding]:
+    """Findings about trends, each at `LIMITS.driver_probability`.
+
+    ``sizes`` (n,) are the known sizes of the rates [rad/s], ``u`` (9,) the standard uncertainties of the coefficients,
+    by more than which those move that are harmed.
+    """
+    fit = rate_fit.fit
+    row, axis = residual_rows(sizes)
+    along = np.where((axis >= 0)[:, None], np.eye(3)[np.maximum(axis, 0)], fit.directions[row])
+    passed = (row - row.mean()) / max(int(np.max(row)), 1)
+    bias, bias_p = _told(rate_fit, passed[:, None] * along)
+    scale, scale_p = _told(rate_fit, (passed * np.where(axis < 0, sizes[row], 0.0))[:, None])
+    if min(bias_p, scale_p) >= LIMITS.driver_probability:
+        return
+    if bias_p <= scale_p:
+        value, size, effect = bias[0], bias[1], passed[:, None] * along
+        each = zip("xyz", np.degrees(value) * 3600.0, np.degrees(size) * 3600.0, strict=True)
+        words = ", ".join(f"{name} {' ± '.join(rounded(of, of_u))} deg/h" for name, of, of_u in each)
+        what, cure = (
+            f"the biases drift from the first to the last orientation ({words})",
+            "wait until the gyro is warm",
+        )
+    else:
+        value, size, effect = scale[0], scale[1], (passed * np.where(axis < 0, sizes[row], 0.0))[:, None]
+        words = " ± ".join(rounded(1e6 * float(value[0]), 1e6 * float(size[0])))
+        what = f"the rate or the scale factors change by {words} ppm from the first to the last orientation"
+        cure = "let both get warm, and check the rate at the end"
+    shift = np.abs(fit.gain() @ (effect @ value))
+    yield Finding(
+        "trend",
+        f"{what}: {cure}, or take the orientations in an order that tells, there and back",
+        harm=tuple(name for name, each_shift, own in zip(NAMES, shift, u, strict=True) if each_shift > own),
+    )
+
+
+def _told(rate_fit: RateFit, columns: Array) -> tuple[tuple[Array, Array], float]:
+    """Sizes (k,) of effects ``columns`` (N, k) with their u (k,), and the probability of such by chance."""
+    from scipy.special import fdtrc
+
+    P, r, k = rate_fit.fit.left(), rate_fit.fit.residuals, columns.shape[1]
+    dof = float(np.sum(rate_fit.dof)) - k
+    information = columns.T @ P @ columns
+    if dof < 3.0 or np.linalg.cond(information) > 1.0 / math.sqrt(np.finfo(float).eps):
+        return (np.zeros(k), np.zeros(k)), 1.0
+    inverse = np.linalg.inv(information)
+    value = inverse @ columns.T @ P @ r
+    gained = float(value @ information @ value)
+    left = max(float(r @ P @ r) - gained, 1e-300) / dof
+    return (value, np.sqrt(np.diag(inverse) * left)), float(fdtrc(k, dof, gained / k / left))
+
+
+def outlying(rate_fit: RateFit) -> int | None:
+    """Place of the orientation that lies off what all others say, at `LIMITS.outlier_risk` over all; None if none
+    does."""
+    fit = rate_fit.fit
+    probability = without_rows(fit, rate_fit.dof[rate_fit.group]) * len(fit.row)
+    worst = int(np.argmin(probability))
+    return int(fit.row[worst]) if probability[worst] < LIMITS.outlier_risk else None
+
+
+def outlying_finding(values: Array, without: Array, u: Array, place: str, number: int) -> Finding:
+    """The finding about the orientation at that ``place``, the ``number`` th.
+
+    ``values`` (9,) are the coefficients, ``without`` (9,) those without it with their ``u`` (9,), by more than which
+    those move that are harmed.
+    """
+    shift = (values - without) / u
+    leading = int(np.argmax(np.abs(shift)))
+    text = (
+        f"one orientation lies off what all others say ({place}); without it {NAMES[leading]} would be "
+        f"{abs(shift[leading]):.1f} u {'smaller' if shift[leading] > 0 else 'larger'}: was it moved while the table "
+        f'turned, or did the table turn at another rate? leave it out by imu.exclude = ["pose {number}"]'
+    )
+    harm = tuple(name for name, each in zip(NAMES, shift, strict=True) if abs(each) > 1.0)
+    return Finding("outlying_pose", text, place, harm)
+
 
 MODEL = Formula(
     r"$y = S T \omega + b$, $S = \mathrm{diag}(S)$, $T = 1$ + misalignment (upper-triangular; $T_{ij}$: response of "

@@ -22,9 +22,8 @@ from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.noise.dwell_means import AllanFit
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.known_turns.turn import Turn, find_turn, noise_at_rest, stamped
 from inercal.systems.imu.limits import LIMITS

@@ -19,9 +19,8 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, Uncertainty, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.identified import weakness
 from inercal.systems.imu.limits import LIMITS

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.systems.imu.turns import Turns, increments, whole_turns
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.systems.imu.multiposition.gyro import GyroFit

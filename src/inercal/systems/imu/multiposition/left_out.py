@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.deletion import Added
 from inercal.systems.imu.multiposition.joint import Joint, radial

@@ -13,9 +13,8 @@ from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import Uncertainty, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.identified import spread_words
 from inercal.systems.imu.limits import LIMITS

@@ -13,7 +13,7 @@ from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_SIZE
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.places import counted
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit

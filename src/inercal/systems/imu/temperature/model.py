@@ -15,9 +15,8 @@ import numpy as np
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
-from inercal.foundation.results.basis import Basis, provenance
+from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.temperature.cubic import Cubic

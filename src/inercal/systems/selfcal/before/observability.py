@@ -11,7 +11,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import UNSEEN, Learned, learned
 from inercal.foundation.results.remarks import Goal, at_prior, missed, reached
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.platform.coefficients import shown_units

@@ -15,9 +15,8 @@ from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.findings import Finding
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
-from inercal.systems.selfcal.before.left_out import left_out, shifts
 from inercal.systems.selfcal.before.observability import Observability, observability
-from inercal.systems.selfcal.before.path_search import criterion, search
+from inercal.systems.selfcal.before.path_search import criterion, left_out, search, shifts
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import beyond

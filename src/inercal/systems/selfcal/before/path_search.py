@@ -2,6 +2,8 @@
 
 A sequence is judged by its bounds at coarser steps, with the noise of a sample taken down accordingly. The changes
 tried: a turn reversed, given to another joint, shortened or lengthened, two exchanged, one divided.
+
+Errors of the rig that are no states, before the test: how far those of usual size shift coefficients.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -19,14 +21,52 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.computing.executors import Executor
 from inercal.foundation.designs.search import from_starts, improved
 from inercal.foundation.errors import StudyError
-from inercal.systems.selfcal.before.bounds import PathBounds, bounds
-from inercal.systems.selfcal.before.left_out import LeftOut, left_out, shifts
+from inercal.systems.selfcal.before.bounds import PathBounds, bounds, nominal_attitudes
+from inercal.systems.selfcal.before.considered import sensitivities
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem
 from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.coefficients import product_slope
 from inercal.systems.selfcal.platform.joint_limits import JointLimits, spans
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion
+from inercal.systems.selfcal.platform.plan import CommandedMotion, Plan, Rest, Turn, motion
+from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
+from inercal.systems.selfcal.platform.states import ALL, KIND_OF, WAVE
 from inercal.systems.selfcal.settings import Search, SelfcalSettings
+
+
+class LeftOut(NamedTuple):
+    """Names (m,) of errors that are no states, and their standard deviations ``sizes`` (m,) [SI]."""
+
+    names: tuple[str, ...]
+    sizes: Array
+
+
+def left_out(settings: SelfcalSettings) -> LeftOut:
+    """The errors of ``design.robust``, as large as stated, else as usual; raises `StudyError` for one that is a
+    state."""
+    states, sizes = settings.states, settings.priors
+    for kind in settings.search.robust:
+        if kind in settings.kinds:
+            text = f"found {kind}, which is among the states, expected errors that are left out of them"
+            raise StudyError("design.robust", text)
+    named = ALL[18 : WAVE + 2 * len(states.harmonics)]
+    hidden = {*states.names, *settings.model.left_out}
+    names = tuple(name for name in named if KIND_OF[name] in settings.search.robust and name not in hidden)
+    return LeftOut(names, np.array([sizes[ALL.index(name)] for name in names]))
+
+
+def shifts(motion: CommandedMotion, problem: FilterProblem, of: LeftOut, warm: Array | None = None) -> Array:
+    """Shifts (p, m) of the coefficients, product form, by one standard deviation of each error along a nominal path.
+
+    ``warm`` (n,) [K] as of `inercal.systems.selfcal.before.bounds.bounds`.
+    """
+    if not of.names:
+        return np.zeros((len(problem.prior), 0))
+    n, c = len(motion.t), problem.mean
+    q = nominal_attitudes(motion, problem, c, warm)
+    recording = Recording(motion.t, motion.rate, motion.angles, np.zeros((n, 3)), warm=warm)
+    return np.asarray(product_slope(c) @ sensitivities(recording, problem, q, c, of.names) * of.sizes)
+
 
 Sequence: TypeAlias = tuple[tuple[int, int], ...]
 """Turns as joint 0, 1, 2 and signed number of angles."""

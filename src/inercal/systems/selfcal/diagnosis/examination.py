@@ -17,7 +17,7 @@ from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.inference.hypotheses import Hypothesis, likeliest, sigmas
 from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.instruments.terms import shown_unit
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.selfcal.diagnosis.fit_quality import (
     JUDGE,
     Case,

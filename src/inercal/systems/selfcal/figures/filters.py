@@ -13,7 +13,7 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.rig import Triad, Turn, rig
 from inercal.faces.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
 from inercal.foundation.arrays import Array
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals
 from inercal.systems.selfcal.result.comparison import attitude_errors as errors_of
 

@@ -25,7 +25,7 @@ from inercal.foundation.geometry.rotations import (
 )
 from inercal.systems.selfcal.filters.filter_result import FilterResult, History
 from inercal.systems.selfcal.filters.problem import FilterProblem, Start, admitted, apart, updating, watch
-from inercal.systems.selfcal.platform.linearised_rows import LinearisedRows, linearise_rows, linearise_steps
+from inercal.systems.selfcal.platform.linearised import LinearisedRows, linearise_rows, linearise_steps
 from inercal.systems.selfcal.platform.recording import Recording, Steps
 from inercal.systems.selfcal.platform.rig import World
 from inercal.systems.selfcal.platform.states import LEVER

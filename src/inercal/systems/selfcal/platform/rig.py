@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.earth import earth_rate
+from inercal.foundation.geometry.earth import Site, earth_rate
 from inercal.foundation.geometry.rotations import (
     Axis,
     conjugate,
@@ -28,7 +28,6 @@ from inercal.foundation.geometry.rotations import (
     multiply,
     to_matrix,
 )
-from inercal.foundation.geometry.site import Site
 from inercal.foundation.rigs.chain import Chain, Joint
 
 JOINTS = ("th_x", "th_y", "th_z")

@@ -14,9 +14,8 @@ from inercal.foundation.findings import CODES, EVERYTHING, Finding, Status, caus
 from inercal.foundation.inference.consistency import Nis, nis
 from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN
 from inercal.foundation.records.places import counted
-from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, reached, singular
 from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds

@@ -10,8 +10,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN, learned
 from inercal.foundation.records.places import counted
-from inercal.foundation.results.rounding import rounded, short
-from inercal.foundation.results.table import Table, heads
+from inercal.foundation.results.shown import Table, heads, rounded, short
 from inercal.systems.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.platform.coefficients import shown_units

@@ -18,8 +18,7 @@ from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN
 from inercal.foundation.instruments.terms import TERMS, shown_unit
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.results.remarks import at_prior_together
-from inercal.foundation.results.rounding import short
-from inercal.foundation.results.table import Table, heads
+from inercal.foundation.results.shown import Table, heads, short
 from inercal.systems.strapdown.before.bounds import Pieces, PlanBounds, bounds
 from inercal.systems.strapdown.before.path_search import Path, TurnGround, attitudes, search
 from inercal.systems.strapdown.limits import LIMITS

@@ -17,9 +17,8 @@ from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeB, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.remarks import at_prior_together, exact_gravity, singular
 from inercal.foundation.results.result import Estimate
 from inercal.systems.strapdown.fit.batch import Fit
@@ -36,8 +35,7 @@ from inercal.systems.strapdown.model.coefficients import (
     stated,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.considered import considered
-from inercal.systems.strapdown.noise.left_out import Tested, posed, tests
+from inercal.systems.strapdown.noise.left_out import Tested, considered, posed, tests
 from inercal.systems.strapdown.noise.restricted import residuals
 from inercal.systems.strapdown.result.budget import sources
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings

@@ -14,7 +14,7 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres, plane
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.terms import shown_unit
-from inercal.foundation.results.rounding import rounded
+from inercal.foundation.results.shown import rounded
 from inercal.foundation.rigs.outputs import gravity_reference
 from inercal.systems.turntable.figures.table import factor_rows, rig, rig_facts
 

@@ -14,8 +14,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
-from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.geometry.site import Site
+from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.results.budget import TypeB
 from inercal.foundation.rigs.outputs import rate_reference
 from inercal.systems.turntable.limits import LIMITS

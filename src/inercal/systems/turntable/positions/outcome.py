@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.comparison import in_basis
+from inercal.foundation.designs.criteria import in_basis
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_LENGTH
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import conditions_of, studied
+from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.chain import Scope

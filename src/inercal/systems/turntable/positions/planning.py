@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.computing.executors import Executor
-from inercal.foundation.designs.allowed import insensitive, within
-from inercal.foundation.designs.candidates import Candidates
-from inercal.foundation.designs.comparison import PlanFigures, judge
-from inercal.foundation.designs.criteria import Criterion, D, a_criterion, i_criterion
+from inercal.foundation.designs.candidates import Candidates, insensitive, within
+from inercal.foundation.designs.criteria import Criterion, D, PlanFigures, a_criterion, i_criterion, judge
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.errors import StudyError

@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.foundation.designs.tolerances import LOOSEST, TIGHTEST
 from inercal.foundation.instruments.terms import shown_unit
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned
 from inercal.systems.turntable.display import per_g
 from inercal.systems.turntable.positions.fit import earth_rate_of
 from inercal.systems.turntable.positions.outcome import unit_of_term

@@ -17,12 +17,12 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.noise import scatter
 from inercal.systems.turntable.positions.outcome import unit_of_term
 from inercal.systems.turntable.rate.fit import ROUNDS, RateFit, weighted, weights_of
 from inercal.systems.turntable.rate.stays import Effect, Input, RateDwells, gyro_input
 from inercal.systems.turntable.regression import FLOOR
 from inercal.systems.turntable.settings import TurntableSettings
+from inercal.systems.turntable.weights import scatter
 
 
 def axis_about(along: Array) -> str:

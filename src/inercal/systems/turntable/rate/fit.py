@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import Identifiability, identify
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.noise import ReadingNoise, scatter
 from inercal.systems.turntable.rate.linearity import Deviations, Largest, drawn_errors, largest
 from inercal.systems.turntable.rate.stays import Effect, Input
 from inercal.systems.turntable.regression import FLOOR, Solution, solve
-from inercal.systems.turntable.weights import Weights
+from inercal.systems.turntable.weights import ReadingNoise, Weights, scatter
 
 ROUNDS = 3
 """Fits that are made: the effect of the table depends on the scale factor, and hardly changes after the first."""

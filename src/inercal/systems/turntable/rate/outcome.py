@@ -11,9 +11,8 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Basis, conditions_of, studied
+from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, Uncertainty, combine
-from inercal.foundation.results.formula import Formula
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.turntable.limits import LIMITS

@@ -14,8 +14,7 @@ from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.computing.executors import Executor
 from inercal.foundation.errors import StudyError
 from inercal.foundation.records.places import counted
-from inercal.foundation.results.rounding import concise
-from inercal.foundation.results.table import aligned
+from inercal.foundation.results.shown import aligned, concise
 from inercal.foundation.rigs.outputs import table_outputs
 from inercal.foundation.sensitivities import averages
 from inercal.foundation.sensitivities.averages import Averages, Flag
