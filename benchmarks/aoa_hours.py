@@ -18,8 +18,8 @@ import numpy as np
 from aoa_tunnels import STUDY
 from independent.aoa import DEG, Run, Tunnel, simulate
 
-from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.fusion.filter_result import FusionResult, estimate
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
 from inercal.systems.aoa.reading.recording import plain
 
 NEXT = {
@@ -38,13 +38,13 @@ def measured(tunnel: Tunnel, seed: int, number: int) -> tuple[Run, np.ndarray]:
     return replace(run, acc=acc, gyro=gyro), run.t > 2.0
 
 
-def off(run: Run, found: FilterResult, rows: np.ndarray) -> tuple[float, float]:
+def off(run: Run, found: FusionResult, rows: np.ndarray) -> tuple[float, float]:
     """Mean squares of error [deg] and of error over u."""
     error = (found.theta - run.theta)[rows]
     return np.square(error / DEG).mean(), np.square(error / found.u[rows]).mean()
 
 
-def constants(run: Run, of: FilterProblem, found: FilterResult) -> Iterator[float]:
+def constants(run: Run, of: FusionProblem, found: FusionResult) -> Iterator[float]:
     """Errors of the constants at the end over their u."""
     e = run.errors
     true = {"b_g": e["b_g"], "k_g": e["k_g"], "tau_g": 0.0}
@@ -54,7 +54,7 @@ def constants(run: Run, of: FilterProblem, found: FilterResult) -> Iterator[floa
         yield (found.state.x[k] - true[name]) / np.sqrt(found.state.P[k, k])
 
 
-def known(of: FilterProblem, found: FilterResult) -> FilterProblem:
+def known(of: FusionProblem, found: FusionResult) -> FusionProblem:
     """The problem with what was found as its prior."""
     at, P = of.nuisances, found.state.P
     values = {name: float(found.state.x[k]) for name, k in at.items()}

@@ -26,7 +26,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from measure import PROCESSOR, Row, alone, row
 
-from inercal.bench.live.measurement import Measurement, measure
+from inercal.bench.live.measurement import RunningMeasurement, measure
 from inercal.examples import FOLDER
 
 HEADER = b"t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]\n"
@@ -116,7 +116,7 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
         return int(found.getsockname()[1])
 
 
-def ready(running: Measurement) -> Measurement:
+def ready(running: RunningMeasurement) -> RunningMeasurement:
     """The measurement, once it waits for rows."""
     while running.state in ("new", "preparing"):
         time.sleep(0.01)
@@ -130,7 +130,7 @@ def resident() -> float:
 
 def through(
     folder: Path, kind: str, path: Path, rate: float, study: Path, to: tuple[str, ...] = ()
-) -> tuple[Measurement, float]:
+) -> tuple[RunningMeasurement, float]:
     """Send a file of lines through a wire; the measurement, ended, and the processor time that it took [s]."""
     port = free_port(socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM)
     where = str(folder / f"port{port}") if kind == "serial" else str(port)

@@ -21,9 +21,9 @@ from inercal.foundation.geometry.rotations import boxplus
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.estimators import KINDS
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.settings import Disturbances
 
 SEED = 20261121
@@ -62,7 +62,7 @@ def wrong_starts(seeds):
                 if angle is not None:
                     axis = rng.standard_normal(3)
                     off = math.radians(angle) * axis / np.linalg.norm(axis)
-                    start = Start(boxplus(simulated.attitude[0], off), math.radians(angle))
+                    start = AttitudeStart(boxplus(simulated.attitude[0], off), math.radians(angle))
                 errors.append(
                     worst(estimate(simulated.recording, of, kind, start, history=False), made.truth)
                 )
@@ -72,7 +72,7 @@ def wrong_starts(seeds):
 
 def gimbal_lock(seeds):
     """A path on which the inner gimbal goes through 90 deg."""
-    settings = replace(STUDY, plan=Plan(THROUGH_LOCK))
+    settings = replace(STUDY, plan=PlatformPlan(THROUGH_LOCK))
     made, of = experiment(settings), problem(settings)
     print(
         f"\npath through thy = 90 deg, {seeds} seeds: largest error over u, and how many say that they failed"

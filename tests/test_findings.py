@@ -7,7 +7,7 @@ import pytest
 
 import inercal
 from inercal.bench.workbench.advice import Advice, advice_of
-from inercal.cli.options import Output, ReportOutput
+from inercal.cli.options import OutputOptions, ReportOutput
 from inercal.cli.outcome import say_findings
 from inercal.faces.report.html import render
 from inercal.foundation.findings import EVERYTHING, Finding, most_harmful, with_alternatives
@@ -75,7 +75,7 @@ def test_other_causes_are_counted_and_named():
 
 @pytest.mark.parametrize(
     ("output", "more"),
-    [(Output(), "--json has all"), (ReportOutput(), "--report and --json have all")],
+    [(OutputOptions(), "--json has all"), (ReportOutput(), "--report and --json have all")],
 )
 def test_the_terminal_tells_three_and_counts_the_others(output, more, capsys):
     findings = [Finding("gap", f"gap {k}") for k in range(4)]

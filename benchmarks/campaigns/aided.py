@@ -11,7 +11,7 @@ from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.imu.aided.calibration import calibrate_aided
-from inercal.systems.imu.aided.simulate import Program, Truth, simulate
+from inercal.systems.imu.aided.simulate import AidedTruth, Program, simulate
 from inercal.systems.imu.settings import AidedSettings, ImuSettings
 
 GRAVITY, GRAVITY_U = 9.81, 2e-4
@@ -36,7 +36,7 @@ PROGRAM: Program = [
 """Nine rests and whole and part turns about all axes."""
 
 
-def draw_truth(rng: np.random.Generator) -> Truth:
+def draw_truth(rng: np.random.Generator) -> AidedTruth:
     """An instrument with 1 % errors, its biases wandering, at a random heading and beside the crossing of the axes."""
 
     def triad(bias: float) -> TriadModel:
@@ -46,7 +46,7 @@ def draw_truth(rng: np.random.Generator) -> Truth:
 
     heading = rng.uniform(-np.pi, np.pi)
     across = EARTH_RATE * np.cos(LATITUDE)
-    return Truth(
+    return AidedTruth(
         acc=triad(0.1),
         gyro=triad(2e-3),
         gravity=rng.normal(GRAVITY, GRAVITY_U),

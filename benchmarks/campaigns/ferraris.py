@@ -11,9 +11,9 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
-from inercal.systems.imu.ferraris.simulate import Session, simulate_session, true_values
+from inercal.systems.imu.ferraris.simulate import SessionCourse, simulate_session, true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
-from inercal.systems.imu.simulate import ImuTruth, Noise, draw_full_truth
+from inercal.systems.imu.simulate import ImuTruth, TriadNoise, draw_full_truth
 
 ALIGNMENT = math.radians(0.5)
 """Standard deviation of each direction of a position and of the axis of a turn, in either direction across it [rad]."""
@@ -34,7 +34,7 @@ LATITUDE = 0.8
 def noisy_truth(rng: np.random.Generator) -> ImuTruth:
     """An instrument of the consumer grade whose biases wander."""
     truth = draw_full_truth(rng)
-    return replace(truth, accelerometer_noise=Noise(8e-4, 1e-4), gyro_noise=Noise(5.6e-4, 5e-5))
+    return replace(truth, accelerometer_noise=TriadNoise(8e-4, 1e-4), gyro_noise=TriadNoise(5.6e-4, 5e-5))
 
 
 def one_calibration(rng: np.random.Generator) -> dict[str, Array]:
@@ -56,7 +56,7 @@ def one_calibration_by_scatter(rng: np.random.Generator) -> dict[str, Array]:
 def _one(rng: np.random.Generator, stated: float | None) -> dict[str, Array]:
     """A simulated calibration with that alignment stated."""
     truth = noisy_truth(rng)
-    session = Session(
+    session = SessionCourse(
         alignment=ALIGNMENT,
         turn_u=TURN_U,
         gravity=rng.normal(GRAVITY, GRAVITY_U),

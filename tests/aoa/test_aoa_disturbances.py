@@ -11,7 +11,7 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
-from inercal.systems.aoa.disturbances import AngleShaking, Disturbances, Line, Mains, Plunge, Shaking
+from inercal.systems.aoa.disturbances import AngleShaking, Disturbances, Mains, Plunge, Shaking, VibrationLine
 from inercal.systems.aoa.settings import MotionPlan, Noise
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure
@@ -43,7 +43,7 @@ def outside(x, low, high):
 
 
 def test_lines_shake_the_whole_model_along_z_and_x():
-    lines = (Line(112.0, 0.3 * G), Line(230.0, 0.05 * G, 0.1 * G))
+    lines = (VibrationLine(112.0, 0.3 * G), VibrationLine(230.0, 0.05 * G, 0.1 * G))
     acc = rest(lines=lines).recording.acc
     f, up = amplitudes(acc[:, 2])
     along = amplitudes(acc[:, 1])[1]

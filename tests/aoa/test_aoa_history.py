@@ -12,7 +12,7 @@ from sting_study import DEG, study
 
 from inercal.foundation.records.write import SUFFIXES, write_record
 from inercal.foundation.units import Quantity, parse_unit
-from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.angles import Angles, stated_roll
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
@@ -139,7 +139,7 @@ def test_a_stream_tells_the_rows_of_a_file(measured):
 def test_rows_beyond_the_limits_have_an_alarm(measured):
     """Of pitch, or of alpha where the study states how the model lies: 10 deg of pitch are 15 deg of it."""
     settings, made, angles = measured
-    limits = Alarm(lowest=-1.0 * DEG, highest=14.0 * DEG)
+    limits = AlarmLimits(lowest=-1.0 * DEG, highest=14.0 * DEG)
     watched = replace(settings, alarm=limits)
     steep = replace(watched, attitude=Attitude(upwash=degrees(5.0)))
     for chosen, name in ((watched, "theta"), (steep, "alpha")):
@@ -152,10 +152,10 @@ def test_rows_beyond_the_limits_have_an_alarm(measured):
         (said,) = beyond_limits(angles, made.t, chosen)
         assert f"{name} is 14" in said.message
         assert f"so are {int((record['alarm'].values == 1.0).sum())} rows of {len(made.t)}" in said.message
-    assert beyond_limits(angles, made.t, replace(settings, alarm=Alarm(highest=1.0))) == []
+    assert beyond_limits(angles, made.t, replace(settings, alarm=AlarmLimits(highest=1.0))) == []
     assert (
         "below the study's 19 deg"
-        in beyond_limits(angles, made.t, replace(settings, alarm=Alarm(lowest=19.0 * DEG)))[0].message
+        in beyond_limits(angles, made.t, replace(settings, alarm=AlarmLimits(lowest=19.0 * DEG)))[0].message
     )
 
 

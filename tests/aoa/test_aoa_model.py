@@ -283,7 +283,7 @@ def test_the_turning_of_a_rolled_model_and_its_derivatives(seed, p, y):
 
     def after(x):
         F, Q = transition(of, dt)
-        angles = model.turning(x, model.Step(dt, p, y, Q[0, 0]), of.model, F, Q)
+        angles = model.turning(x, model.FusionStep(dt, p, y, Q[0, 0]), of.model, F, Q)
         return np.array(angles), F, Q
 
     (theta, phi), F, Q = after(x)
@@ -314,7 +314,7 @@ def test_the_rates_of_the_angles_are_those_of_the_attitude():
     x[0], x[1] = course(t)[1], -omega[1]
     x[of.places.roll] = course(t)[2]
     F, Q = transition(of, dt)
-    theta, phi = model.turning(x, model.Step(dt, omega[0], omega[2], 0.0), of.model, F, Q)
+    theta, phi = model.turning(x, model.FusionStep(dt, omega[0], omega[2], 0.0), of.model, F, Q)
     _, ahead, rolled = course(t + dt)
     assert theta - x[0] == pytest.approx(ahead - x[0], abs=30 * DEG * dt**2 * 50)
     # over cos^2 theta + 1e-4 in place of cos^2 theta

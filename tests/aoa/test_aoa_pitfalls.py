@@ -46,7 +46,7 @@ def hard_gated(of, recording):
     for k, z in enumerate(recording.rows):
         motion = x[1], x[2], x[3]
         if k:
-            loop.go_on(belief, model.Step(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
+            loop.go_on(belief, model.FusionStep(step, 0.0, 0.0, 0.0), of.model, F, Q, work)
         at = model.Prediction(x, math.sin(x[0]), math.cos(x[0]), 0.0, 0.0, *motion)
         for i in range(of.count + 1):
             expected, noise, size = loop.reading(i, at, math.nan, of.model, row)

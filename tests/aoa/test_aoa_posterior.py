@@ -20,7 +20,7 @@ from inercal.systems.aoa.reference.corrections import corrected as put_right
 from inercal.systems.aoa.reference.sensor_fit import fit
 from inercal.systems.aoa.result.carry_over import corrected, load
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
-from inercal.systems.aoa.settings import Calibration, MotionPlan
+from inercal.systems.aoa.settings import MotionPlan, SensorCalibration
 from inercal.systems.aoa.simulate import drawn_biases, simulate
 from rows import for_each
 
@@ -158,11 +158,11 @@ def test_a_position_stated_anew_is_refused(saved):
 def test_another_calibration_is_refused(saved):
     path, settings, _ = saved
     with pytest.raises(StudyError, match=r"scale = 1 of a1, expected scale = 1\.001"):
-        load(path, replace(settings, sensors={"a1": Calibration(scale=1.001)}))
+        load(path, replace(settings, sensors={"a1": SensorCalibration(scale=1.001)}))
     with pytest.raises(StudyError, match=r"bias = 0 .* of gyro"):
-        load(path, replace(settings, sensors={"gyro": Calibration(bias=1e-4)}))
+        load(path, replace(settings, sensors={"gyro": SensorCalibration(bias=1e-4)}))
     # a range changes nothing of what was found
-    load(path, replace(settings, sensors={"a1": Calibration(range=20.0)}))
+    load(path, replace(settings, sensors={"a1": SensorCalibration(range=20.0)}))
 
 
 def test_other_sensors_are_refused(saved):

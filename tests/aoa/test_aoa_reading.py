@@ -17,7 +17,7 @@ from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
 from inercal.systems.aoa.reading.from_record import of_sensors, recording_of
-from inercal.systems.aoa.settings import Calibration
+from inercal.systems.aoa.settings import SensorCalibration
 from inercal.systems.aoa.simulate import simulate
 
 SHORT = study(motion=replace(BASE, duration=2.0))
@@ -48,7 +48,7 @@ def record(t=T, clocks=None, **changes):
 
 def changed(name, **of):
     """The study with a calibration."""
-    return replace(SHORT, sensors={name: Calibration(**of)})
+    return replace(SHORT, sensors={name: SensorCalibration(**of)})
 
 
 def codes(recording):
@@ -173,13 +173,13 @@ def test_missing_sensors():
 
 def test_a_calibration_that_ended_badly_is_named_in_files_and_streams():
     """Its numbers are used: whether they are good enough is for the user to say."""
-    settings = study(sensors={"a2": Calibration(caution="a2.json ended inconsistent: why")})
+    settings = study(sensors={"a2": SensorCalibration(caution="a2.json ended inconsistent: why")})
     assert (
         the(recording_of(record(), settings), "bad_verdict").message == "a2: a2.json ended inconsistent: why"
     )
     told = of_sensors(["a1", "a3"], ["gyro"], record(), settings)
     assert all(finding.code != "bad_verdict" for finding in told)  # of a sensor that is not there, nothing
-    rolling = study(sensors={"gyro_roll": Calibration(caution="roll.json ended inconsistent: why")})
+    rolling = study(sensors={"gyro_roll": SensorCalibration(caution="roll.json ended inconsistent: why")})
     for gyros, count in (
         (["gyro", "gyro_roll"], 0),
         (["gyro", "gyro_roll", "gyro_yaw"], 1),

@@ -16,16 +16,16 @@ from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.disturbances import Disturbances, Oscillation
 from inercal.systems.aoa.motion import buffet, course, duration
 from inercal.systems.aoa.reading.from_record import recording_of
-from inercal.systems.aoa.settings import Calibration, MotionPlan
+from inercal.systems.aoa.settings import MotionPlan, SensorCalibration
 from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each
 
 #: sensors in volts and counts, with biases and temperature terms
 RAW = {
-    "a1": Calibration(0.5 * G, 1.25 * G, 10.0 * G, 50e-6, 1e-4 * G, 25.0, "V"),
-    "a2": Calibration(-61e-6 * G, 0.01 * G, per="count"),
-    "a3": Calibration(1.002, -0.02, bias_slope=1e-3),
-    "gyro": Calibration(20.0 * DEG, 0.5 * DEG, scale_slope=-1e-4, per="V"),
+    "a1": SensorCalibration(0.5 * G, 1.25 * G, 10.0 * G, 50e-6, 1e-4 * G, 25.0, "V"),
+    "a2": SensorCalibration(-61e-6 * G, 0.01 * G, per="count"),
+    "a3": SensorCalibration(1.002, -0.02, bias_slope=1e-3),
+    "gyro": SensorCalibration(20.0 * DEG, 0.5 * DEG, scale_slope=-1e-4, per="V"),
 }
 
 
@@ -100,7 +100,10 @@ def test_gyros_for_roll_and_yaw_come_with_such_motion(tmp_path):
 def test_saturation_is_that_of_what_is_measured_and_is_masked_on_reading():
     """A range is about the zero point, also of a sensor that indicates 2.5 V there: 0.95 g are 4.4 V and 0.6 V."""
     limit = 0.95 * G
-    sensors = {"a2": Calibration(0.5 * G, 1.25 * G, limit, per="V"), "gyro": Calibration(range=40.0 * DEG)}
+    sensors = {
+        "a2": SensorCalibration(0.5 * G, 1.25 * G, limit, per="V"),
+        "gyro": SensorCalibration(range=40.0 * DEG),
+    }
     plan = MotionPlan("sine", 4.0, amplitude=80.0 * DEG, frequency=0.5)
     settings = replace(scenario("clipping"), motion=plan, sensors=sensors)
     made = simulate(settings, np.random.default_rng(1)).recording

@@ -35,7 +35,7 @@ from inercal.systems.aoa.result.tables import (
     use_of_fit,
 )
 from inercal.systems.aoa.result.verification import errors
-from inercal.systems.aoa.settings import Calibration, MotionPlan, Timing
+from inercal.systems.aoa.settings import MotionPlan, SensorCalibration, Timing
 from inercal.systems.aoa.simulate import simulate
 
 PAUSES = MotionPlan(
@@ -189,7 +189,7 @@ def test_sensors_of_the_conditions_are_told_in_words_with_units(shown):
         "a2": "lambda 0 deg, r 0.2 m, z 0 m",
         "a3": "lambda -90 deg, r 0.25 m, z 0 m",
     }
-    sensors_known = {"a1": Calibration(scale=1.01, bias=0.5), "gyro": Calibration(bias=0.1 * DEG)}
+    sensors_known = {"a1": SensorCalibration(scale=1.01, bias=0.5), "gyro": SensorCalibration(bias=0.1 * DEG)}
     _, other, _ = measured(sensors=sensors_known)
     told = displayed(other).conditions["sensors"]
     assert told["a1"].endswith("scale 1.01, bias 0.5 m/s^2")

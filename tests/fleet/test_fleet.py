@@ -24,7 +24,7 @@ from inercal.foundation.computing.cluster import ChunkLostError, Cluster
 from inercal.foundation.computing.executors import Processes
 from inercal.foundation.errors import InputError
 from inercal.laboratory.fleet.batch import _chunks, _rows
-from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.manifest import FleetUnit, read_manifest
 from inercal.laboratory.fleet.unit import Batch, content_of, row_of, row_path
 from inercal.laboratory.store import make_store
 
@@ -287,8 +287,8 @@ def test_a_row_of_a_manifest(tmp_path):
         "serial,imu.method,files\n007,means,a.csv; s3://lab/b.csv\n\n008,,c.csv\n", encoding="utf-8-sig"
     )
     assert read_manifest(path) == (
-        Unit("007", (str(tmp_path / "a.csv"), "s3://lab/b.csv"), ("imu.method=means",)),
-        Unit("008", (str(tmp_path / "c.csv"),)),
+        FleetUnit("007", (str(tmp_path / "a.csv"), "s3://lab/b.csv"), ("imu.method=means",)),
+        FleetUnit("008", (str(tmp_path / "c.csv"),)),
     )
 
 

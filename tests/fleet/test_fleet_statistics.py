@@ -6,14 +6,14 @@ from scipy.stats import binom, binomtest
 
 from inercal.laboratory.fleet.capability import Share, spreads
 from inercal.laboratory.fleet.fleet import RISK, TREND_RISK, distances, fleet_of, limit
-from inercal.laboratory.fleet.unit import Coefficient, Row
+from inercal.laboratory.fleet.unit import Coefficient, UnitRow
 from inercal.laboratory.specification import specification_of
 
 
 def rows_of(values, status="ok", **more):
     """Rows of units with coefficients K1_x.. of the given values (n, p)."""
     return [
-        Row(
+        UnitRow(
             f"{k}",
             status,
             "",
@@ -99,7 +99,7 @@ def test_dates_are_the_time_of_the_trend():
     rng = np.random.default_rng(8)
     days = [f"2026-01-{1 + k:02d}" for k in range(30)]
     values = rng.standard_normal((30, 1)) + 0.5 * np.arange(30)[:, None]
-    rows = [Row(**{**vars(row), "measured": day}) for row, day in zip(rows_of(values), days, strict=True)]
+    rows = [UnitRow(**{**vars(row), "measured": day}) for row, day in zip(rows_of(values), days, strict=True)]
     fleet = fleet_of(rows[::-1], specification())
     assert fleet.per == "day"
     assert fleet.trends[0].slope == pytest.approx(0.5, abs=0.1)
@@ -107,6 +107,6 @@ def test_dates_are_the_time_of_the_trend():
 
 def test_nothing_is_said_of_too_few_and_of_no_units():
     assert fleet_of(rows_of(np.zeros((3, 2))), specification()).strange == ()
-    empty = fleet_of([Row("1", "refused", "why")], specification())
+    empty = fleet_of([UnitRow("1", "refused", "why")], specification())
     assert empty.spreads == ()
     assert empty.first == ((0, "refused: why"),)

@@ -19,7 +19,7 @@ pytest.importorskip("nicegui")
 
 import httpx
 
-from inercal.bench.workbench.jobs import State
+from inercal.bench.workbench.jobs import JobState
 from inercal.bench.workbench.rest import rest_of
 
 
@@ -268,7 +268,7 @@ def test_no_body_ends_the_queue(count, tmp_path, monkeypatch):
         answers(answering)
         last = answering.ask("POST", "/validation").json()["job"]
         assert (
-            answering.bench.queue.wait(last, 60.0).state is State.INTERRUPTED
+            answering.bench.queue.wait(last, 60.0).state is JobState.INTERRUPTED
         )  # begun, and it left no exit code
     finally:
         answering.bench.close()

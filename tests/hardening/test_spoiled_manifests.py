@@ -9,7 +9,7 @@ import pytest
 from independent.fleet import made
 
 from inercal.foundation.errors import InputError
-from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.manifest import FleetUnit, read_manifest
 from inercal.laboratory.fleet.unit import FAILED, Batch, result_path, row_path
 
 SOUND = (
@@ -123,7 +123,7 @@ def test_whatever_a_cell_says_is_a_row_in_one_sentence(tmp_path, many):
             [str(lab / "unit000.csv"), *ADDRESSES], [20, *[1] * len(ADDRESSES)], k=rng.randint(1, 2)
         )
         keys = [f"{rng.choice(KEYS)}={rng.choice(VALUES)}" for _ in range(rng.randrange(3))]
-        unit = Unit(f"{number}", tuple(files), tuple(keys))
+        unit = FleetUnit(f"{number}", tuple(files), tuple(keys))
         row = Batch(lab / "fleet.csv", "", lab / "imu.toml", None, out)._row(unit)
         statuses.add(row.status)
         assert row.status != FAILED, (unit, row)

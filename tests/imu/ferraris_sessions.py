@@ -13,7 +13,7 @@ from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
-from inercal.systems.imu.ferraris.simulate import Session, quiet, simulate_session
+from inercal.systems.imu.ferraris.simulate import SessionCourse, quiet, simulate_session
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_full_truth
 
@@ -45,7 +45,7 @@ def session(seed: int, noisy: bool = False, g_sensitivity: float = 2e-4, **given
     truth = draw_full_truth(rng, g_sensitivity)
     if not noisy:
         truth = quiet(truth)
-    return simulate_session(truth, replace(Session(), **given), rng)
+    return simulate_session(truth, replace(SessionCourse(), **given), rng)
 
 
 def in_degrees(record: Record, scale: float = 1.0) -> tuple[Record, float]:

@@ -16,7 +16,7 @@ from inercal.foundation.records.record import record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
-from inercal.systems.imu.multiposition.deletion import LinearFit
+from inercal.systems.imu.multiposition.deletion import LinearisedFit
 from inercal.systems.imu.multiposition.drift import bias_drift_shown, scale_drift_shown
 from inercal.systems.imu.multiposition.joint import join
 from inercal.systems.imu.settings import ImuSettings
@@ -175,7 +175,7 @@ def turns(rng, of=30):
     """Misses of turns made linear, in two directions, which scatter with the length of the turn, and three scales."""
     jacobian, growth = rng.standard_normal((of, 2, 12)), rng.uniform(1.0, 4.0, of)
     r = np.sqrt(growth)[:, None] * rng.standard_normal((of, 2))
-    return LinearFit(r, jacobian, 0.1 * np.eye(2 * of), growth, np.zeros((12, 12))), jacobian[:, :, 3:6]
+    return LinearisedFit(r, jacobian, 0.1 * np.eye(2 * of), growth, np.zeros((12, 12))), jacobian[:, :, 3:6]
 
 
 @pytest.mark.parametrize("draws", [300, pytest.param(1000, marks=pytest.mark.campaign)])

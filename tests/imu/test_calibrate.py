@@ -14,7 +14,7 @@ from inercal.systems.imu.multiposition.calibration import calibrate_multipositio
 from inercal.systems.imu.multiposition.poses import sweep
 from inercal.systems.imu.recording import prepare
 from inercal.systems.imu.settings import ImuSettings
-from inercal.systems.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from inercal.systems.imu.simulate import TriadNoise, draw_truth, hand_poses, simulate
 from rows import for_each
 
 SITE = Site(9.81, (), 0.8)
@@ -25,7 +25,7 @@ def recording(seed=1, poses=20, quiet=False, g_sensitivity=0.0, **options):
     rng = np.random.default_rng(seed)
     truth = draw_truth(rng, g_sensitivity)
     if quiet:
-        truth = replace(truth, accelerometer_noise=Noise(1e-7), gyro_noise=Noise(1e-8))
+        truth = replace(truth, accelerometer_noise=TriadNoise(1e-7), gyro_noise=TriadNoise(1e-8))
     return simulate(truth, hand_poses(rng, poses), SITE.gravity, 0.8, rng, **{"rate": 50.0} | options)
 
 
@@ -275,7 +275,7 @@ def test_earth_rate_is_in_the_uncertainty_also_at_one_heading(white, latitude_kn
     total = 0.0
     for seed in range(runs):
         rng = np.random.default_rng(900 + seed)
-        truth = replace(draw_truth(rng), gyro_noise=Noise(white))
+        truth = replace(draw_truth(rng), gyro_noise=TriadNoise(white))
         record, truth = simulate(truth, heading_kept(rng, 14), 9.81, 0.8, rng, rate=25.0, start=15.0)
         site = Site(9.81, (), 0.8 if latitude_known else None)
         estimate = calibrate(record, ImuSettings(site)).estimate
@@ -364,7 +364,7 @@ def test_lost_samples_jitter_and_coarse_stamps_do_not_stop_a_calibration():
 def test_a_coarse_gyro_says_so_and_its_bias_is_no_better_than_a_step():
     """Output in steps of 1/16.4 deg/s with less noise than half a step: u(D_F) is at least step/sqrt(12)."""
     rng = np.random.default_rng(21)
-    truth = replace(draw_truth(rng), gyro_noise=Noise(2e-5))
+    truth = replace(draw_truth(rng), gyro_noise=TriadNoise(2e-5))
     record, truth = simulate(truth, hand_poses(rng, 20), 9.81, 0.8, rng, rate=50.0)
     t, acc, gyro = arrays(record)
     step = 4775.0 / 57.3 / 16.4

@@ -14,7 +14,7 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.systems.imu.figures import pictures
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
-from inercal.systems.imu.multiposition.deletion import LinearFit, held_out, outlying
+from inercal.systems.imu.multiposition.deletion import LinearisedFit, held_out, outlying
 from inercal.systems.imu.settings import Exclusion
 from rows import for_each
 
@@ -27,7 +27,7 @@ def linear(rng, n=24, p=9, shifts=()):
     for place, size in shifts:
         y[place] += size
     fitted = jacobian[:, 0] @ np.linalg.lstsq(jacobian[:, 0], y, rcond=None)[0]
-    return LinearFit(y - fitted, jacobian, np.zeros((n, n)), np.ones(n), np.zeros((p, p)))
+    return LinearisedFit(y - fitted, jacobian, np.zeros((n, n)), np.ones(n), np.zeros((p, p)))
 
 
 def test_squares_left_are_those_of_the_fit_without_the_row():
@@ -43,7 +43,7 @@ def test_other_rows_count_as_if_they_were_items():
     rng = np.random.default_rng(1)
     J, y = rng.normal(size=(20, 4)), rng.normal(size=20)
     r = y - J @ np.linalg.lstsq(J, y, rcond=None)[0]
-    items = LinearFit.beside(
+    items = LinearisedFit.beside(
         r[:12].reshape(6, 2), J[:12].reshape(6, 2, 4), np.zeros((12, 12)), np.ones(6), J[12:], r[12:]
     )
     own = float(np.linalg.lstsq(J[12:], y[12:], rcond=None)[1][0])

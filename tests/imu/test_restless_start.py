@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from inercal.foundation.findings import Status
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
-from inercal.systems.imu.simulate import Noise, draw_truth, hand_poses, simulate
+from inercal.systems.imu.simulate import TriadNoise, draw_truth, hand_poses, simulate
 from rows import for_each
 
 
@@ -58,7 +58,7 @@ def test_outputs_without_noise_at_rest_are_calibrated(step):
     Rounding errors scatter by step/sqrt(12): u of the biases is that over some root of 24 poses at least.
     """
     rng = np.random.default_rng(5)
-    truth = replace(draw_truth(rng), accelerometer_noise=Noise(0.0), gyro_noise=Noise(5e-6))
+    truth = replace(draw_truth(rng), accelerometer_noise=TriadNoise(0.0), gyro_noise=TriadNoise(5e-6))
     record, truth = simulate(truth, hand_poses(rng, 24), 9.81, 0.8, rng, rate=50.0)
     t, acc, gyro = arrays(record)
     if step:

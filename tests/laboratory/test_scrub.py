@@ -28,7 +28,7 @@ from inercal.laboratory.keep import Item, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.scrub import scrub
 from inercal.laboratory.store import digest_of, happened, make_store, open_store
-from inercal.laboratory.tables import Base, Event
+from inercal.laboratory.tables import Event, Tables
 from rows import for_each
 
 SECRET = "Hunter2SeCrEt"
@@ -79,7 +79,7 @@ def everything(store):
     """All that a store holds: rows as texts, and the bytes of its objects, those inside of certificates unpacked."""
     with store.engine.connect() as connection:
         rows = [
-            str(row) for table in Base.metadata.sorted_tables for row in connection.execute(select(table))
+            str(row) for table in Tables.metadata.sorted_tables for row in connection.execute(select(table))
         ]
     contents = [store.objects.read(name) for name in store.objects.names()]
     for content in list(contents):

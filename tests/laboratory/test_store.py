@@ -264,10 +264,10 @@ def test_the_migrations_make_the_tables_that_the_program_reads(store):
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
 
-    from inercal.laboratory.tables import Base
+    from inercal.laboratory.tables import Tables
 
     with store.engine.connect() as connection:
-        assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+        assert compare_metadata(MigrationContext.configure(connection), Tables.metadata) == []
     migrate(store.engine, store.where)  # the version is the last one: nothing left to do
 
 

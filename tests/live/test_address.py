@@ -4,7 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from inercal.bench.live.address import Mqtt, Pieces, Replay, Serial, Tcp, Text, Udp, sink_of, source_of
+from inercal.bench.live.address import (
+    Mqtt,
+    PieceFolder,
+    Replay,
+    SerialPort,
+    Tcp,
+    Text,
+    Udp,
+    sink_of,
+    source_of,
+)
 from inercal.foundation.errors import InputError
 from rows import for_each
 
@@ -12,8 +22,8 @@ from rows import for_each
 @for_each(
     "text, wanted",
     [
-        ("serial:/dev/ttyUSB0?baud=921600", Serial("/dev/ttyUSB0", 921600)),
-        ("serial:COM3", Serial("COM3", 115200)),
+        ("serial:/dev/ttyUSB0?baud=921600", SerialPort("/dev/ttyUSB0", 921600)),
+        ("serial:COM3", SerialPort("COM3", 115200)),
         ("udp://127.0.0.1:5005", Udp("127.0.0.1", 5005)),
         ("UDP://[::1]:5005", Udp("::1", 5005)),
         ("tcp://rig-2.lab:7", Tcp("rig-2.lab", 7)),
@@ -34,8 +44,8 @@ def test_sources(text, wanted):
     [
         ("text:out.csv", Text(Path("out.csv"))),
         ("text:-", Text(None)),
-        ("parquet:folder", Pieces(Path("folder"), "parquet")),
-        ("hdf5:folder", Pieces(Path("folder"), "hdf5")),
+        ("parquet:folder", PieceFolder(Path("folder"), "parquet")),
+        ("hdf5:folder", PieceFolder(Path("folder"), "hdf5")),
         ("udp://127.0.0.1:1", Udp("127.0.0.1", 1)),
         ("mqtt://host/a", Mqtt("host", 1883, "a")),
     ],

@@ -13,9 +13,9 @@ from wires import HEADER, Datagrams, by_stream, free_port, rows, until, waiting,
 
 from inercal.bench.live import sinks
 from inercal.bench.live.address import sink_of, source_of
-from inercal.bench.live.counts import Spread, Stamps
-from inercal.bench.live.measurement import Measurement, Plan, measure
-from inercal.bench.live.pieces import Row, payload
+from inercal.bench.live.counts import Stamps, TimeSpread
+from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement, measure
+from inercal.bench.live.pieces import EstimatorRow, payload
 from inercal.bench.live.sinks import Outlet
 from inercal.faces.python.study import study_of
 from inercal.faces.stream.estimators import of_study
@@ -181,12 +181,12 @@ def test_a_reader_that_leaves_ends_it_in_order(study, tmp_path):
         printed.append(text)
 
     of = study_of(study)
-    plan = Plan(
+    plan = MeasurementPlan(
         source_of(f"replay:{tmp_path / 'log.csv'}?speed=1"),
         lambda say, say_finding: of_study(of, 0.0, say, say_finding),
         sinks=[sink_of("text:-")],
     )
-    running = Measurement(plan, print_line=print_line)
+    running = RunningMeasurement(plan, print_line=print_line)
     running.start()
     assert running.join(60.0)
     assert (running.failure, running.incomplete) == ("", False)
@@ -216,7 +216,7 @@ def test_pieces_go_on_from_those_that_are_there(tmp_path):
         assert sorted(path.name for path in (tmp_path / "h").iterdir()) == [
             f"{i:08d}.h5" for i in range(1, k)
         ]
-        outlet.offer(Row("1.0", [float(k)], 0.0))
+        outlet.offer(EstimatorRow("1.0", [float(k)], 0.0))
         outlet.settle()
         assert (tmp_path / "h" / f"{k:08d}.h5").exists()
         outlet.close()
@@ -274,7 +274,7 @@ def test_stamps_are_judged():
 
 def test_quantiles_are_within_a_bin_of_those_of_all_values():
     values = np.random.default_rng(1).lognormal(-8.0, 1.0, 20_000)
-    spread = Spread()
+    spread = TimeSpread()
     assert np.isnan(spread.quantile(0.5))
     for each in values.tolist():
         spread.on(each)
@@ -287,7 +287,7 @@ def test_nobody_at_the_other_end_of_datagrams_is_no_error():
     outlet = Outlet(sink_of(f"udp://127.0.0.1:{free_port(socket.SOCK_DGRAM)}"), print, pytest.fail)
     outlet.begin(["t [s]"])
     for k in range(5):
-        outlet.offer(Row(f"{k}.0", [float(k)], 0.0))
+        outlet.offer(EstimatorRow(f"{k}.0", [float(k)], 0.0))
         assert until(lambda k=k: outlet.counts.written == k + 1)
     outlet.close()
     assert outlet.failure == ""
@@ -302,7 +302,7 @@ def test_a_chain_of_two(study, tmp_path, request):
     outlet.begin(HEADER.decode().strip().split(","))
     for line in rows(100):
         text = line.decode().strip()
-        outlet.offer(Row(text, [float(each) for each in text.split(",")], 0.0))
+        outlet.offer(EstimatorRow(text, [float(each) for each in text.split(",")], 0.0))
     assert until(lambda: second.counts.rows == 100)
     outlet.close()
     second.stop(wait=10.0)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from inercal.foundation.instruments.noise import NoiseModel, allan_terms
 from inercal.foundation.noise import covariance
 from inercal.foundation.noise.covariance import ALPHA, degrees_of_freedom, lag_one, pair_sums, sums
-from inercal.foundation.noise.curve import Curve
+from inercal.foundation.noise.curve import AllanCurve
 from inercal.foundation.noise.deviation import PRESENT, allan_deviation
 from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
 
@@ -155,7 +155,7 @@ def test_covariance_under_gaps_is_that_of_the_weights_left(share):
         np.testing.assert_allclose(
             (allan_terms(lengths) * gain) @ squares, [np.trace(each) for each in VC], rtol=1e-9
         )
-        fitted = Curve(
+        fitted = AllanCurve(
             np.ones(4), allan_terms(lengths), left, sums(n, lengths).with_gaps(n, gain[:, 0], gain[:, 4])
         )
         found.append(fitted.covariance(squares))

@@ -9,7 +9,7 @@ from inercal.foundation.inference.factor import EIGEN, root
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import quaternion
 from inercal.systems.selfcal.filters.problem import problem
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.settings import Filter
 
 STEPS = 400
@@ -33,7 +33,9 @@ def our_eigen(P):
 def test_as_filterpy(factor, theirs, limit):
     """Attitude, coefficients and their covariance after each of 400 steps in which all three joints turn."""
     moves = (Turn("y", 0.5), Turn("z", -0.6), Turn("x", 0.4))
-    settings = study(plan=Plan(moves, start=(0.3, -0.2, 0.1)), filter=Filter("svd-qukf", factor=factor))
+    settings = study(
+        plan=PlatformPlan(moves, start=(0.3, -0.2, 0.1)), filter=Filter("svd-qukf", factor=factor)
+    )
     told = problem(settings)
     recording = simulate(experiment(settings), np.random.default_rng(20261121)).recording
     x, P, nis = plain_filterpy.run(told, recording, STEPS, theirs)

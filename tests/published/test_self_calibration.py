@@ -16,12 +16,12 @@ from inercal.systems.selfcal.before.path_design import at_rest, with_stops
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.filters import quaternion
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.monte_carlo import campaign
 from inercal.systems.selfcal.platform.coefficients import NAMES, to_linear, to_product
 from inercal.systems.selfcal.platform.kinematics import attitude
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.rig import Base
 from inercal.systems.selfcal.settings import Filter, Gating
 
@@ -242,7 +242,7 @@ def test_at_gimbal_lock(moves):
     The gimbal model is off by far more, and says so: 4 standard deviations at least, thousands at low noise.
     """
     limit = 4.0  # of 72 normal errors one beyond it in 200 tests
-    for run in many(study(plan=Plan(moves)), range(4)):
+    for run in many(study(plan=PlatformPlan(moves)), range(4)):
         given = problem(study())
         q, error_state, gimbal = (
             estimate(run.recording, given, kind, history=False)
@@ -254,13 +254,13 @@ def test_at_gimbal_lock(moves):
         assert in_sigma(error_state, q) < 0.5
         assert not gimbal.converged
         assert in_sigma(gimbal, q) > 2.5
-    run, given = made(0, noise="low", plan=Plan(moves))
+    run, given = made(0, noise="low", plan=PlatformPlan(moves))
     assert from_truth(estimate(run.recording, given, "gimbal-ukf", history=False)) > 300.0
 
 
 def test_two_degrees_from_gimbal_lock_the_gimbal_model_is_right():
     """With the inner gimbal at 88 deg it agrees with the quaternion model to 0.004 standard deviations."""
-    run, given = made(0, plan=Plan((Turn("y", 88 * DEG), Turn("z", 90 * DEG), Turn("x", 90 * DEG))))
+    run, given = made(0, plan=PlatformPlan((Turn("y", 88 * DEG), Turn("z", 90 * DEG), Turn("x", 90 * DEG))))
     q, gimbal = (estimate(run.recording, given, kind) for kind in ("svd-qukf", "gimbal-ukf"))
     assert gimbal.converged
     assert in_sigma(gimbal, q) < 0.004
@@ -273,7 +273,7 @@ def test_svd_and_cholesky_give_other_points():
     """Not the same result, though the difference is of no use to anyone: 1e-7 standard deviations from the encoders'
     attitude, 5e-4 from one that is 60 deg off. Singular values and eigenvalues of a covariance are one thing."""
     run, given = made()
-    away = Start(boxplus(run.attitude[0], 60 * DEG * np.array([0.48, 0.6, 0.64])), 60 * DEG)
+    away = AttitudeStart(boxplus(run.attitude[0], 60 * DEG * np.array([0.48, 0.6, 0.64])), 60 * DEG)
     for start, low, high in ((None, 1e-9, 1e-6), (away, 1e-5, 1e-2)):
         found = {
             factor: estimate(
@@ -478,7 +478,9 @@ def test_initial_errors(runs, degrees):
     given, worst, nis = problem(study()), dict.fromkeys(KINDS, 0.0), dict.fromkeys(KINDS, np.inf)
     for seed, run in enumerate(runs[:4]):
         axis = np.random.default_rng(100 + seed).standard_normal(3)
-        start = Start(boxplus(run.attitude[0], degrees * DEG * axis / np.linalg.norm(axis)), degrees * DEG)
+        start = AttitudeStart(
+            boxplus(run.attitude[0], degrees * DEG * axis / np.linalg.norm(axis)), degrees * DEG
+        )
         for kind in KINDS:
             found = estimate(run.recording, given, kind, start, history=False)
             worst[kind] = max(worst[kind], from_truth(found))

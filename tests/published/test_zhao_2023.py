@@ -26,7 +26,7 @@ from inercal.systems.turntable import regression
 from inercal.systems.turntable.model import stated_values, table_model
 from inercal.systems.turntable.positions import planning
 from inercal.systems.turntable.positions.tolerance import shifts, sphere_moments
-from inercal.systems.turntable.settings import Constraint, Design, Instrument, TurntableSettings
+from inercal.systems.turntable.settings import Constraint, Instrument, PositionDesign, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 LATITUDE = np.radians(39.1)  # any will do: only the shift of the maps depends on it
@@ -341,7 +341,7 @@ def study(chain=CHAIN, **design):
         "two_axis_turntable",
         chain,
         named("24-position"),
-        Design(grid((36, 36)), **design),
+        PositionDesign(grid((36, 36)), **design),
         instrument=Instrument(
             unit=DEG_H,
             coefficients={name: value * DEG_H.factor for name, value in COEFFICIENTS.items()},

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from inercal.foundation.errors import MapError, RecordError
 from inercal.foundation.records.checksums import CHECKS
 from inercal.foundation.records.frame_kernel import value
-from inercal.foundation.records.frames import Frame, Turns, frames_in
+from inercal.foundation.records.frames import CounterTurns, Frame, frames_in
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from rows import for_each
@@ -131,10 +131,10 @@ def test_a_damaged_frame_takes_no_sound_one_with_it():
 @pytest.mark.kernels
 def test_counters_go_on_beyond_their_range():
     counter = np.array([254, 255, 0, 3, 2, 4, 100], np.uint8)
-    turns, numbers = Turns().on(counter)
+    turns, numbers = CounterTurns().on(counter)
     assert numbers.tolist() == [254, 255, 256, 259, 258, 260, 356]
     assert turns.missing == 1 + 95
-    halves = Turns()
+    halves = CounterTurns()
     told = []
     for part in (counter[:2], counter[2:2], counter[2:5], counter[5:]):
         halves, some = halves.on(part)
@@ -151,7 +151,7 @@ def test_counters_go_on_beyond_their_range():
     ],
 )  # fmt: skip
 def test_one_wrong_counter_moves_no_others(counter, wanted):
-    assert Turns().on(np.array(counter, np.uint8))[1].tolist() == wanted
+    assert CounterTurns().on(np.array(counter, np.uint8))[1].tolist() == wanted
 
 
 @given(
@@ -169,9 +169,9 @@ def test_each_counter_is_counted_from_the_newest(steps, wrong, cut):
         newest = max(wanted, default=each)
         wanted.append(newest + 128 - (128 - (each - newest)) % 256)
     counter = counter.astype(np.uint8)
-    whole, numbers = Turns().on(counter)
+    whole, numbers = CounterTurns().on(counter)
     assert numbers.tolist() == wanted
-    first, one = Turns().on(counter[:cut])
+    first, one = CounterTurns().on(counter[:cut])
     both, two = first.on(counter[cut:])
     assert (both, [*one.tolist(), *two.tolist()]) == (whole, wanted)
 

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inercal.foundation.records.read import read, text
-from inercal.foundation.records.read.layout import Block, Layout
+from inercal.foundation.records.read.layout import Block, TextLayout
 from inercal.foundation.records.read.plain_rows import LEAST, MOST, fives, plain_rows
 
 COMMA = b",.\n#%"
@@ -137,7 +137,7 @@ def test_rows_and_flaws_are_those_of_line_by_line(lines, marks, end, cut):
     data = "".join((delimiter or " ").join(line) + end for line in lines)
     data = data.removesuffix(end) if cut and data.removesuffix(end) else data
     block = Block(data.encode(), b"\n", 5, not data.endswith("\n"))
-    layout = Layout(delimiter, decimal, ("#", "%"), 3, (), 0, 0)
+    layout = TextLayout(delimiter, decimal, ("#", "%"), 3, (), 0, 0)
     for indices in ((0, 1, 2), (2, 0), (1,)):
         rows, flaws = text._gone_through(block, layout, indices)
         wanted, flaw = text._line_by_line(block, layout, indices)

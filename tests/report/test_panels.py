@@ -8,8 +8,8 @@ import pytest
 from inercal.faces.report.cells import small
 from inercal.faces.report.coefficients import limits
 from inercal.faces.report.marks import (
+    Area,
     Axis,
-    Band,
     Bars,
     Cells,
     Colours,
@@ -21,7 +21,7 @@ from inercal.faces.report.marks import (
     Strips,
 )
 from inercal.faces.report.panels import draw, symlog_ticks
-from inercal.faces.report.rig import Triad, Turn, rig
+from inercal.faces.report.rig import DrawnTriad, DrawnTurn, rig
 
 
 def words(picture):
@@ -33,8 +33,8 @@ def test_every_mark_is_drawn():
     marks = [
         Line(x, x, "line"),
         Dots(x, x, "dots", up=x),
-        Band(x, x, x + 1.0, "band"),
-        Band(edges, x, x + 1.0, steps=True),
+        Area(x, x, x + 1.0, "band"),
+        Area(edges, x, x + 1.0, steps=True),
         Strips((0.0, 1.0)),
         Level(1.0, "level"),
         Bars(x, 0.0 * x, x, "bars"),
@@ -52,7 +52,7 @@ def test_small_panels_are_of_the_same_marks():
     marks = [
         Line(x, x, "line"),
         Dots(x, x, "dots"),
-        Band(x, x, x + 1.0, "band"),
+        Area(x, x, x + 1.0, "band"),
         Strips((0.0, 1.0)),
         Level(1.0, "level"),
         Level(1.0, upright=True),
@@ -98,7 +98,7 @@ def test_ticks_on_both_sides_of_zero(reach, ticks):
 
 def test_the_arrow_of_a_joint_turns_right_handed_about_its_axis():
     """Seen from the south-east and above, a turn about up runs counterclockwise on the paper."""
-    drawn = rig("Rig", "", [Turn("up", np.array([0.0, 0.0, 1.0]))], Triad("xyz", np.eye(3)))
+    drawn = rig("Rig", "", [DrawnTurn("up", np.array([0.0, 0.0, 1.0]))], DrawnTriad("xyz", np.eye(3)))
     x, y = next(line.get_data() for line in drawn.figure.axes[0].lines if len(line.get_xdata()) == 60)
     area = 0.5 * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
     middle = (np.mean(x), np.mean(y))

@@ -17,7 +17,7 @@ from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
 from inercal.systems.turntable.figures.sensitivity import page as sensitivity_page
 from inercal.systems.turntable.sensitivity.analysis import analyse
-from inercal.systems.turntable.settings import Analysis, Design, TurntableSettings
+from inercal.systems.turntable.settings import Analysis, PositionDesign, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 EXACT = Analysis()
@@ -60,7 +60,7 @@ class Rows(HTMLParser):
 
 def study(plan, table="two_axis_turntable", analysis=EXACT, **errors):
     chain = turntable(table, uniform(2.0 * ARCMIN), errors)
-    return TurntableSettings(PARIS, table, chain, plan, Design(grid((4, 4))), analysis)
+    return TurntableSettings(PARIS, table, chain, plan, PositionDesign(grid((4, 4))), analysis)
 
 
 def told(analysed):
@@ -168,7 +168,9 @@ def test_no_maps_of_one_position_or_of_three_angles(plan, table):
 def test_an_output_without_variance():
     """About x and y alone nothing moves az to first order; about z of the mounting nothing moves it at all."""
     chain = turntable("two_axis_turntable", None, {"dtheta_z": uniform(ARCMIN)})
-    settings = TurntableSettings(PARIS, "two_axis_turntable", chain, grid((4, 4)), Design(grid((4, 4))))
+    settings = TurntableSettings(
+        PARIS, "two_axis_turntable", chain, grid((4, 4)), PositionDesign(grid((4, 4)))
+    )
     analysed, text, _ = page_of(settings)
     assert np.isnan(analysed.mean.first[2]).all()
     assert "–" in text

@@ -22,7 +22,7 @@ from inercal.foundation.geometry.rotations import (
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.batch import _terms_at, estimate_map, inverse_diagonal
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.residuals import (
     first_reading,
     readings,
@@ -325,9 +325,9 @@ def test_a_wrong_start_without_encoders_is_forgotten(name, degrees):
     directions = [*np.eye(3), *np.random.default_rng(17).standard_normal((2, 3))]
     th = np.where(np.arange(len(made.recording.t))[:, None] > 0, np.nan, made.recording.th)
     blind = replace(made.recording, th=th)
-    near = estimate_map(blind, given, Start(made.attitude[0], np.radians(degrees)))
+    near = estimate_map(blind, given, AttitudeStart(made.attitude[0], np.radians(degrees)))
     for direction in directions:
         off = np.radians(degrees) * direction / np.linalg.norm(direction)
-        found = estimate_map(blind, given, Start(boxplus(made.attitude[0], off), np.radians(degrees)))
+        found = estimate_map(blind, given, AttitudeStart(boxplus(made.attitude[0], off), np.radians(degrees)))
         assert found.converged
         assert_allclose(found.coefficients / sigmas(near), near.coefficients / sigmas(near), atol=0.01)

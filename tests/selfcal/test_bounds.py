@@ -18,7 +18,7 @@ from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import KA0, KG0, product_slope, to_linear
 from inercal.systems.selfcal.platform.kinematics import attitude
-from inercal.systems.selfcal.platform.plan import Plan, Rest, motion
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, motion
 from inercal.systems.selfcal.platform.rig import Gimbals
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Filter, Gating, Noise
@@ -30,7 +30,7 @@ def along(study, **other):
 
 def at_rest(noise, prior, earth=True, time=100.0, step=0.5):
     """Motion and problem of a platform that rests level, with or without the earth turning."""
-    asked = study(plan=Plan((Rest(time),), step=step), noise="nominal")
+    asked = study(plan=PlatformPlan((Rest(time),), step=step), noise="nominal")
     asked = replace(asked, noise=noise, prior=prior)
     stated = problem(asked)
     if not earth:

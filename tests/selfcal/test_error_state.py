@@ -20,7 +20,7 @@ from inercal.foundation.geometry.rotations import (
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import error_state
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform import linearised, model
 from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
@@ -279,7 +279,7 @@ def test_a_wrong_start_that_is_told_as_such_does_no_harm(short, degrees):
     of = problem(study())
     q = np.array(attitude(short.th[0], of.world.axes, of.world.signs))
     off = np.radians(degrees) * np.array([0.6, -0.64, 0.48])
-    found = estimate(short, of, start=Start(boxplus(q, off), np.radians(degrees)))
+    found = estimate(short, of, start=AttitudeStart(boxplus(q, off), np.radians(degrees)))
     plain = estimate(short, of)
     sigma = np.sqrt(np.diag(plain.covariance))
     assert np.abs((found.coefficients - plain.coefficients) / sigma).max() < 0.1

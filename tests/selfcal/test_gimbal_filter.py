@@ -11,12 +11,12 @@ from unscented_twin import RIGS, angle_rates, gimbal, joints
 from inercal.foundation.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import gimbal as model
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import NAMES, to_linear
 from inercal.systems.selfcal.platform.kinematics import angles, parity
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.rig import Gimbals, World
 from inercal.systems.selfcal.settings import Filter
 from rows import for_each
@@ -184,7 +184,7 @@ def test_euler_steps_bias_the_coefficients_where_nis_shows_nothing(paper):
 @pytest.mark.parametrize("integration", ["rk4", "euler"])
 def test_gimbal_lock_is_flagged(moves, integration):
     """Through thy = 90 deg, or at rest there, it goes wrong without an exception, and says so."""
-    settings = study(plan=Plan(moves), filter=Filter(integration=integration))
+    settings = study(plan=PlatformPlan(moves), filter=Filter(integration=integration))
     given, truth = problem(settings), to_linear(settings.truth)[:18]
     recording = simulate(experiment(settings), np.random.default_rng(1)).recording
     found = estimate(recording, given, "gimbal-ukf")
@@ -228,7 +228,7 @@ def test_a_start_at_another_attitude_is_taken_on_the_turn_of_the_encoders(paper)
     settings, runs = paper
     given, th = problem(settings), runs[2].recording.th[0] + 2.0 * np.pi
     turned = th + np.array([0.02, -0.01, 0.03])
-    state = model.initial(given, th, Start(joints(turned[None], given.world)[0][0], 0.05))
+    state = model.initial(given, th, AttitudeStart(joints(turned[None], given.world)[0][0], 0.05))
     np.testing.assert_allclose(state.attitude, turned, atol=1e-12)
     np.testing.assert_array_equal(state.th, th)
     np.testing.assert_allclose(np.diag(state.covariance)[:3], 0.05**2)

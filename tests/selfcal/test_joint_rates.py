@@ -9,12 +9,12 @@ from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
 from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.task import calibrate
 
 D = np.pi / 180.0
-PLAN = Plan(
+PLAN = PlatformPlan(
     (Turn("x", -90 * D), Turn("y", 40 * D), Turn("z", -150 * D), Rest(5.0), Turn("x", -60 * D)), 3.0 * D,
     start=(0.1, 0.0, -0.2),
 )  # fmt: skip

@@ -14,7 +14,7 @@ from inercal.systems.selfcal.before.path_design import at_rest, design, lasting,
 from inercal.systems.selfcal.before.path_search import criterion, search
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.limits import LIMITS
-from inercal.systems.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.plan import PATHS, PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.settings import Search
 
 FEW = Search(turns=3, angle=np.radians(60.0), criterion="mean")
@@ -56,7 +56,7 @@ def test_in_a_small_space_it_finds_the_best_of_all(monkeypatch):
     asked = replace(asked, limits={"th_y": (-np.pi / 3, np.pi / 3)})
     turns = [(joint, count * np.pi / 2) for joint in "xz" for count in (-3, -2, -1, 1, 2, 3)]
     every = [
-        lasting(Plan(tuple(Turn(*turn) for turn in pair)), 270.0)
+        lasting(PlatformPlan(tuple(Turn(*turn) for turn in pair)), 270.0)
         for pair in itertools.product(turns, repeat=2)
         if abs(pair[0][1]) + abs(pair[1][1]) <= 1.5 * np.pi + 1e-9
     ]

@@ -17,8 +17,8 @@ from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_product
-from inercal.systems.selfcal.platform.joint_limits import ANY, JointLimits, Region, beyond
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.joint_limits import ANY, ForbiddenAngles, JointLimits, beyond
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Search
 
@@ -46,7 +46,9 @@ def inside(angles, region):
 
 def test_turns_gain_and_lose_their_rates():
     most = (0.02, 0.03, 0.001)
-    plan = Plan((Turn("x", 1.0), Turn("y", -0.01), Rest(3.0), Turn("z", 2.0, 0.05)), 0.1, acceleration=most)
+    plan = PlatformPlan(
+        (Turn("x", 1.0), Turn("y", -0.01), Rest(3.0), Turn("z", 2.0, 0.05)), 0.1, acceleration=most
+    )
     angles, rates, accelerations = finely(plan)
     assert angles[-1] == pytest.approx([1.0, -0.01, 2.0], abs=1e-12)
     assert angles[::PARTS] == pytest.approx(plan.angles(), abs=1e-12)
@@ -58,12 +60,12 @@ def test_turns_gain_and_lose_their_rates():
 
 
 def test_a_region_is_the_same_whole_turns_on():
-    region = Region(((80 * D, 130 * D), (20 * D, 60 * D), ANY))
+    region = ForbiddenAngles(((80 * D, 130 * D), (20 * D, 60 * D), ANY))
     rng = np.random.default_rng(20261124)
     for _ in range(200):
         start = rng.uniform(-720 * D, 720 * D, 3)
         joint, by = rng.choice(["x", "y", "z"]), rng.uniform(-300 * D, 300 * D)
-        plan = Plan((Turn(joint, by),), rate=1.0, step=0.002, start=tuple(start))
+        plan = PlatformPlan((Turn(joint, by),), rate=1.0, step=0.002, start=tuple(start))
         limits = JointLimits(forbidden=(region,))
         met = bool(inside(plan.angles(), region).any())
         assert (beyond(plan, {}, limits) == ["forbidden region 1"]) == met
@@ -73,7 +75,8 @@ def test_a_region_is_the_same_whole_turns_on():
 def limited():
     joints = JointLimits(
         rate=(1.0 * D, 0.5 * D, np.inf), acceleration=(0.05 * D, 0.1 * D, 2.0 * D),
-        forbidden=(Region(((80 * D, 130 * D), (20 * D, 70 * D), ANY)), Region((ANY, ANY, (100 * D, 140 * D)))),
+        forbidden=(ForbiddenAngles(((80 * D, 130 * D), (20 * D, 70 * D), ANY)), ForbiddenAngles((ANY, ANY, (100 * D, 140
+        * D)))),
     )  # fmt: skip
     asked = Search(turns=6, angle=30.0 * D, time=500.0, closed=True, rest=6.0, criterion="mean")
     present = replace(path("paper"), rate=2.0 * D)
@@ -123,7 +126,7 @@ def test_every_sequence_in_a_small_space_is_judged_alike(limited, monkeypatch):
         for a, b in itertools.product((-2, -1, 1, 2), repeat=2):
             there = [Turn(one, a * 90 * D), Turn(two, b * 90 * D)]
             for back in itertools.permutations([Turn(one, -a * 90 * D), Turn(two, -b * 90 * D)]):
-                plan = SLOW_OUTER.kept(Plan((*there, *back), rate=1.0 * D))
+                plan = SLOW_OUTER.kept(PlatformPlan((*there, *back), rate=1.0 * D))
                 if plan.duration <= 900.0:
                     rest = () if plan.duration == 900.0 else (Rest(900.0 - plan.duration),)
                     best = min(best, value(replace(plan, moves=(*plan.moves, *rest))))
@@ -245,7 +248,7 @@ def test_a_plan_beyond_the_joints_is_not_simulated(tmp_path, more, typed, said):
 
 
 def test_a_search_that_cannot_begin_is_refused(limited):
-    at_start = JointLimits(forbidden=(Region((ANY, (-1 * D, 1 * D), ANY)),))
+    at_start = JointLimits(forbidden=(ForbiddenAngles((ANY, (-1 * D, 1 * D), ANY)),))
     with pytest.raises(StudyError, match="start of the path in a forbidden region"):
         search(replace(limited, joints=at_start))
     with pytest.raises(StudyError, match=r"design\.robust: found kg0, which is among the states"):

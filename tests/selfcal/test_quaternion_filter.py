@@ -11,14 +11,14 @@ from inercal.foundation.geometry.rotations import exp, multiply
 from inercal.foundation.inference.factor import CHOLESKY, FACTORS, NEGATIVE, root
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import error_state, quaternion
-from inercal.systems.selfcal.filters.problem import Start, problem
+from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.settings import Filter, Gating
 
 #: a path on which all three joints turn, 431 rows
-MIXED = Plan((Turn("y", 0.5), Turn("z", -0.6), Turn("x", 0.4)), start=(0.3, -0.2, 0.1))
+MIXED = PlatformPlan((Turn("y", 0.5), Turn("z", -0.6), Turn("x", 0.4)), start=(0.3, -0.2, 0.1))
 
 
 def simulated(seed=20261121, factor="cholesky", extended=False, **changes):
@@ -214,7 +214,7 @@ def test_through_gimbal_lock():
     truth = to_linear(study().truth)[:18]
     squares = 0.0
     for seed in range(8):
-        simulation, told = simulated(seed, plan=Plan(moves))
+        simulation, told = simulated(seed, plan=PlatformPlan(moves))
         state, trace = run(simulation.recording, told)
         other, _ = run(simulation.recording, told, module=error_state)
         u = np.sqrt(np.diag(state.covariance)[4:])
@@ -253,7 +253,7 @@ def test_an_attitude_of_the_other_sign_is_the_same_attitude():
     q = np.array(attitude(simulation.recording.th[0], told.world.axes, told.world.signs))
     ends = []
     for sign in (1.0, -1.0):
-        start = Start(sign * q, told.noise.encoder)
+        start = AttitudeStart(sign * q, told.noise.encoder)
         state, _ = run(
             simulation.recording, told, 50, quaternion.initial(told, simulation.recording.th[0], start)
         )
@@ -268,7 +268,7 @@ def test_a_start_of_its_own():
     simulation, told = simulated(plan=MIXED)
     q = np.array(attitude(simulation.recording.th[0], told.world.axes, told.world.signs))
     away = multiply(q, exp(np.radians([6.0, -6.0, 5.0])))
-    state = quaternion.initial(told, simulation.recording.th[0], Start(away, math.radians(10.0)))
+    state = quaternion.initial(told, simulation.recording.th[0], AttitudeStart(away, math.radians(10.0)))
     variances = np.sort(np.linalg.eigvalsh(state.covariance[:4, :4]))
     np.testing.assert_allclose(variances[1:], math.radians(5.0) ** 2, rtol=1e-6)
     assert variances[0] == pytest.approx(1e-8 * math.radians(5.0) ** 2, rel=1e-4)
@@ -286,7 +286,7 @@ def test_from_a_wrong_attitude(degrees):
         axis = np.random.default_rng(100 + seed).standard_normal(3)
         away = exp(math.radians(degrees) * axis / np.linalg.norm(axis))
         q = multiply(attitude(simulation.recording.th[0], told.world.axes, told.world.signs), away)
-        state = quaternion.initial(told, simulation.recording.th[0], Start(q, math.radians(degrees)))
+        state = quaternion.initial(told, simulation.recording.th[0], AttitudeStart(q, math.radians(degrees)))
         state, _ = run(simulation.recording, told, state=state)
         u = np.sqrt(np.diag(state.covariance)[4:])
         assert np.max(np.abs(state.coefficients - truth) / u) < 4.0

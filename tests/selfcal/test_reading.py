@@ -20,13 +20,13 @@ from inercal.foundation.records.record import Record
 from inercal.foundation.records.write import SUFFIXES, write_record
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.rig import Gimbals
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.task import calibrate
 
 # All three joints turn; 108 s.
-PLAN = Plan(
+PLAN = PlatformPlan(
     (Turn("z", 90 * DEG), Turn("x", 120 * DEG), Turn("y", 60 * DEG), Turn("x", -60 * DEG), Rest(10.0),
      Turn("z", -100 * DEG)),
     rate=5 * DEG,
@@ -309,7 +309,7 @@ def test_a_record_shorter_than_the_path():
 
 def test_angles_at_gimbal_lock_are_not_off_the_path():
     """There outer and platform angle are not unique: any of one sum (or difference) are the same attitude."""
-    turns = Plan((Turn("y", 90 * DEG), Rest(30.0), Turn("z", 90 * DEG)))
+    turns = PlatformPlan((Turn("y", 90 * DEG), Rest(30.0), Turn("z", 90 * DEG)))
     stated = study(plan=turns)
     record = to_record(simulate(experiment(stated), np.random.default_rng(3)).recording)
     away = np.abs(record["th_x"].si())

@@ -16,7 +16,7 @@ from inercal.foundation.geometry.rotations import attitude_difference, elementar
 from inercal.systems.selfcal.filters.residuals import gimbals as all_gimbals
 from inercal.systems.selfcal.platform.kinematics import all_angles, angles, attitude, joint_axes
 from inercal.systems.selfcal.platform.model import propagate
-from inercal.systems.selfcal.platform.plan import PATHS, Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.plan import PATHS, PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 
 LATITUDE = 40.0 * DEG
@@ -242,7 +242,7 @@ MOVES = st.lists(
 @QUICK
 @given(moves=MOVES, step=st.floats(0.05, 0.7))
 def test_every_move_takes_a_whole_number_of_rows_and_is_never_too_fast(moves, step):
-    plan = Plan(tuple(moves), rate=0.2, step=step, start=(0.1, -0.2, 0.3))
+    plan = PlatformPlan(tuple(moves), rate=0.2, step=step, start=(0.1, -0.2, 0.3))
     th = plan.angles()
     assert len(th) == sum(plan.steps(move) for move in moves) + 1
     assert_array_equal(th[0], [0.1, -0.2, 0.3])
@@ -273,7 +273,7 @@ def test_limits_that_a_plan_exceeds():
 
 
 def test_moves_in_words():
-    assert Plan((Turn("z", math.pi), Rest(60.0), Turn("x", -math.pi / 2))).words() == (
+    assert PlatformPlan((Turn("z", math.pi), Rest(60.0), Turn("x", -math.pi / 2))).words() == (
         "(z +180 deg), (rest 60 s), (x -90 deg)"
     )
 
@@ -281,7 +281,7 @@ def test_moves_in_words():
 def test_commands_by_their_definition():
     """w_c = J(th) th' + C_pb w_Ib^b in the middle of each step; a rest is commanded earth rate."""
     place = world(SITE, Base(heading=0.4, tilt=(0.1, -0.2)), Gimbals(("x", "z", "y"), (1, -1, 1)))
-    plan = Plan((Turn("y", 0.5), Turn("x", 1.0, 0.1), Rest(1.0)), start=(0.2, -0.3, 0.5))
+    plan = PlatformPlan((Turn("y", 0.5), Turn("x", 1.0, 0.1), Rest(1.0)), start=(0.2, -0.3, 0.5))
     found = motion(plan, place)
     th = plan.angles()
     assert_array_equal(found.angles, th)
@@ -303,7 +303,9 @@ def test_commands_take_the_platform_through_the_nominal_angles(rig, heading, rat
     """
     place = world(SITE, Base(heading=heading, tilt=(0.05, -0.1)), rig)
     x, y, z = rates
-    plan = Plan((Turn("z", 1.0, z), Turn("x", -1.5, x), Turn("y", 0.8, y), Rest(3.0), Turn("x", 1.0, x)))
+    plan = PlatformPlan(
+        (Turn("z", 1.0, z), Turn("x", -1.5, x), Turn("y", 0.8, y), Rest(3.0), Turn("x", 1.0, x))
+    )
     commanded = motion(plan, place)
     q = q_of(commanded.angles[0], rig)
     out = np.empty_like(commanded.angles)

@@ -15,7 +15,7 @@ from inercal.systems.selfcal.figures import pictures
 from inercal.systems.selfcal.figures.filters import changes_of_turn
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.result.comparison import (
     attitude_errors,
     beside,
@@ -26,7 +26,7 @@ from inercal.systems.selfcal.result.comparison import (
 from inercal.systems.selfcal.task import calibrate, compared
 
 PLAIN = study("best")
-SHORT = Plan((Turn("z", 60 * DEG), Rest(10.0), Turn("x", -30 * DEG)))
+SHORT = PlatformPlan((Turn("z", 60 * DEG), Rest(10.0), Turn("x", -30 * DEG)))
 RECORDING = simulate(experiment(PLAIN), np.random.default_rng(3)).recording
 
 

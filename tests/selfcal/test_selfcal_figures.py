@@ -28,7 +28,7 @@ from inercal.systems.selfcal.before.path_design import ComparedPath, DesignedPat
 from inercal.systems.selfcal.figures.design import page as design_page
 from inercal.systems.selfcal.figures.filters import attitude_errors
 from inercal.systems.selfcal.figures.monte_carlo import page as campaign_page
-from inercal.systems.selfcal.filters.filter_result import FilterResult, History
+from inercal.systems.selfcal.filters.filter_result import FilterResult, RowHistory
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.monte_carlo import Campaign
@@ -40,12 +40,12 @@ from inercal.systems.selfcal.platform.coefficients import (
     to_product,
     units,
 )
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, path
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.result.tables import bounds_by_path, side_by_side, turns, weak_combinations
 from inercal.systems.selfcal.task import Calibration
 
-SHORT = Plan((Turn("z", np.radians(30.0)), Rest(5.0), Turn("x", np.radians(-20.0))))
+SHORT = PlatformPlan((Turn("z", np.radians(30.0)), Rest(5.0), Turn("x", np.radians(-20.0))))
 """55 s, 276 rows."""
 
 SIZES = np.concatenate([np.full(3, s) for s in (PER_HOUR, *3 * (ARCSEC,), MICRO_G, 1e-6, 1e-6, ARCSEC)])
@@ -59,7 +59,7 @@ def filtered(kind="error-state", p=18, seed=1, **changes):
     u = PRIOR[:p] * 0.01 * np.sqrt(n / np.maximum(np.arange(n), n / 1e4))[:, None]
     course = to_linear(TRUTH)[:p] + u * rng.standard_normal(p)
     error = 0.5 * ARCSEC * rng.standard_normal((n, 3))
-    history = History(multiply(q, exp(error)), np.full((n, 3), 0.5 * ARCSEC), course, u)
+    history = RowHistory(multiply(q, exp(error)), np.full((n, 3), 0.5 * ARCSEC), course, u)
     innovations = rng.standard_normal((n - 1, 6))
     return replace(
         FilterResult(

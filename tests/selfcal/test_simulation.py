@@ -25,13 +25,13 @@ from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.platform import model
 from inercal.systems.selfcal.platform.coefficients import BETA, DO, DS, ETA, KA0, KA1, KG0, KG1, to_linear
 from inercal.systems.selfcal.platform.model import specific_force
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn, motion
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion
 from inercal.systems.selfcal.platform.rig import Base, Gimbals
 from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
-from inercal.systems.selfcal.platform.truth import Truth, simulate_truth
+from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
 from inercal.systems.selfcal.settings import Disturbances, Noise
 
-PLAN = Plan(
+PLAN = PlatformPlan(
     (Turn("z", 60 * DEG), Turn("x", 90 * DEG), Turn("y", 40 * DEG), Rest(4.0)),
     rate=6 * DEG,
     start=(0.1, 0.2, -0.3),
@@ -94,7 +94,7 @@ def test_noise_is_integrated_at_the_finer_step_as_in_plain_numpy():
     q, acc = np.empty((n, 4)), np.empty((n, 3))
     q0 = normalize(rng.normal(size=4))
     full = np.append(c, np.zeros(len(ALL) - 24))
-    out = Truth(q, acc, np.empty((n, 3)))
+    out = PlatformTruth(q, acc, np.empty((n, 3)))
     simulate_truth(q0, w, dt, noise, np.zeros(n), full, StateVector((), full).layout, place, out)
     zero = exp(c[BETA])
     earth, up, M, at = rotate(zero, place.earth), rotate(zero, place.up), error_matrix(c), q0
@@ -193,7 +193,7 @@ def test_the_random_walk_of_the_platform():
 
     A platform at rest for 20 s, 300 runs; 5 s of it are a quarter of the variance, and independent of the rest.
     """
-    still = Plan((Rest(20.0),))
+    still = PlatformPlan((Rest(20.0),))
     settings = study(plan=still, truth=np.zeros(24))
     prepared, rng = experiment(settings), np.random.default_rng(4)
     ends = []
@@ -250,7 +250,7 @@ def test_a_delay_of_whole_rows_shifts_the_motion_and_not_the_log(rows):
 
     Earth rate, for which commands make up at the nominal attitude, is what is left: 1e-4 rad.
     """
-    plan = Plan((Rest(4.0), *PLAN.moves), rate=PLAN.rate, start=PLAN.start)
+    plan = PlatformPlan((Rest(4.0), *PLAN.moves), rate=PLAN.rate, start=PLAN.start)
     changes = {"plan": plan, "noise": SILENT, "truth": np.zeros(24)}
     _, late = run(**changes, disturbances=Disturbances(command_delay=0.2 * rows))
     _, perfect = run(**changes)
@@ -260,7 +260,7 @@ def test_a_delay_of_whole_rows_shifts_the_motion_and_not_the_log(rows):
 
 def test_a_part_of_a_row_of_delay():
     """A quarter of a row late: at the row after a start from rest, three quarters of a step have been made."""
-    plan = Plan((Rest(2.0), Turn("z", 10 * DEG)), rate=1 * DEG)
+    plan = PlatformPlan((Rest(2.0), Turn("z", 10 * DEG)), rate=1 * DEG)
     changes = {"plan": plan, "noise": SILENT, "truth": np.zeros(24), "base": Base(), "gimbals": Gimbals()}
     _, late = run(**changes, disturbances=Disturbances(command_delay=0.05, substeps=8))
     assert late.angles[11, 2] == pytest.approx(0.75 * 0.2 * DEG, rel=1e-3)
@@ -269,7 +269,12 @@ def test_a_part_of_a_row_of_delay():
 def test_a_tilted_base_is_felt_by_the_accelerometers():
     """At rest with the joints at zero: f = g (sin of the tilt about east along north), and so on."""
     tilt = (3.0 * DEG, -2.0 * DEG)
-    changes = {"plan": Plan((Rest(4.0),)), "noise": SILENT, "truth": np.zeros(24), "gimbals": Gimbals()}
+    changes = {
+        "plan": PlatformPlan((Rest(4.0),)),
+        "noise": SILENT,
+        "truth": np.zeros(24),
+        "gimbals": Gimbals(),
+    }
     settings, found = run(**changes, base=Base(tilt=tilt))
     g0 = settings.site.gravity
     read = found.recording.acc[1:].mean(axis=0)

@@ -18,7 +18,7 @@ from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.result import budget as sources
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.result.outcome import assemble
@@ -26,7 +26,9 @@ from inercal.systems.selfcal.result.systematic import stated_errors
 from inercal.systems.selfcal.settings import Filter, Noise
 from inercal.systems.selfcal.task import calibrate
 
-SHORT = study(plan=Plan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0))
+SHORT = study(
+    plan=PlatformPlan((Turn("x", np.pi), Turn("y", np.pi), Turn("z", np.pi)), rate=6.0 * DEG, step=1.0)
+)
 
 
 def recorded(settings, seed=3):

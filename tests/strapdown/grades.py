@@ -9,7 +9,7 @@ from inercal.foundation.units import parse_quantity
 from inercal.systems.strapdown.fit.batch import fit
 from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
 from inercal.systems.strapdown.model.coefficients import SIZE, free_places
-from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Plan, Prior, Rests, StrapdownSettings
+from inercal.systems.strapdown.settings import TURN_NOISE, Noise, Prior, Rests, StrapdownSettings, TurnPlan
 from inercal.systems.strapdown.simulate import simulated
 
 
@@ -26,7 +26,7 @@ def plan(text=POSITIONS_19, **times):
     turns = tuple(
         ("xyz".index(turn[-1]), np.radians(-90.0 if turn[0] == "-" else 90.0)) for turn in text.split()
     )
-    return Plan(turns, tuple(np.radians([0.0, -90.0, 0.0])), **times)
+    return TurnPlan(turns, tuple(np.radians([0.0, -90.0, 0.0])), **times)
 
 
 _LATITUDE = np.radians(34.0)

@@ -16,7 +16,7 @@ from inercal.systems.strapdown.before.bounds import Pieces, bounds
 from inercal.systems.strapdown.before.design import NINETEEN, angles_of, by_kind, design
 from inercal.systems.strapdown.before.path_search import TurnGround, attitudes
 from inercal.systems.strapdown.model.coefficients import SIZE
-from inercal.systems.strapdown.settings import Design, Goal, Plan
+from inercal.systems.strapdown.settings import Goal, PathDesign, TurnPlan
 from inercal.systems.strapdown.simulate import start_attitude
 
 LEVEL = (0.0, 0.0, 0.0)
@@ -79,7 +79,7 @@ def test_the_path_of_19_positions_at_nav_grade():
 
 def test_turns_about_one_axis_leave_many_at_their_prior():
     """About the vertical nearly all of the gyros' terms."""
-    turning = replace(NAV, plan=Plan(((2, np.pi / 2),) * 4))
+    turning = replace(NAV, plan=TurnPlan(((2, np.pi / 2),) * 4))
     found = design(turning)
     assert found.tried == 0
     (finding,) = found.findings
@@ -91,9 +91,9 @@ def test_turns_about_one_axis_leave_many_at_their_prior():
 
 @pytest.mark.kernels
 def test_attitudes_are_stated_as_they_are_read():
-    for C in attitudes(Plan(start=(0.3, -0.4, 1.0))) + attitudes(Plan()):
-        assert start_attitude(Plan(start=angles_of(C))) == pytest.approx(C, abs=1e-12)
-    assert len(attitudes(Plan())) == 24
+    for C in attitudes(TurnPlan(start=(0.3, -0.4, 1.0))) + attitudes(TurnPlan()):
+        assert start_attitude(TurnPlan(start=angles_of(C))) == pytest.approx(C, abs=1e-12)
+    assert len(attitudes(TurnPlan())) == 24
 
 
 def test_a_changed_path_is_judged_as_if_it_were_new():
@@ -117,7 +117,9 @@ def test_a_better_path_is_found(turns, start, most):
     from time import process_time
 
     usual = bounds(Pieces(NAV), NAV.plan)
-    settings = replace(NAV, plan=Plan((), start, first_dwell=70.0), design=Design(turns, start="plan"))
+    settings = replace(
+        NAV, plan=TurnPlan((), start, first_dwell=70.0), design=PathDesign(turns, start="plan")
+    )
     clock = process_time()
     found = design(settings)
     assert process_time() - clock < 60.0
@@ -133,8 +135,8 @@ def test_twelve_turns_are_within_a_third_of_eighteen_in_the_same_time():
     """From a level start, in the 592 s of 19 positions; twelve leave more time for each rest."""
     usual, found = bounds(Pieces(NAV), NAV.plan), {}
     for turns in (12, 18):
-        asked = Design(turns, start="plan", time=592.0)
-        found[turns] = design(replace(NAV, plan=Plan((), LEVEL, first_dwell=70.0), design=asked))
+        asked = PathDesign(turns, start="plan", time=592.0)
+        found[turns] = design(replace(NAV, plan=TurnPlan((), LEVEL, first_dwell=70.0), design=asked))
         assert found[turns].plan.duration == pytest.approx(592.0)
     by_mean = {turns: np.exp(np.mean(np.log(each.bounds.u / usual.u))) for turns, each in found.items()}
     assert by_mean[18] < 0.85

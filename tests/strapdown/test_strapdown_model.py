@@ -27,7 +27,7 @@ from inercal.systems.strapdown.model.coefficients import (
     slope,
     stated,
 )
-from inercal.systems.strapdown.model.kernels import State, shoot
+from inercal.systems.strapdown.model.kernels import NodeState, shoot
 from inercal.systems.strapdown.model.samples import Samples, delayed, freed, gains
 from inercal.systems.strapdown.settings import Motion
 from inercal.systems.strapdown.simulate import _turns, simulated, truth
@@ -60,7 +60,7 @@ def carried(samples, nodes, c, state):
 def begun(samples, nodes, c):
     motion = freed(samples, c)
     q = carried_through(motion, nodes, beginning(motion, nodes, SHORT))
-    return State(q, np.zeros((len(q), 3)), np.zeros((len(q), 6)))
+    return NodeState(q, np.zeros((len(q), 3)), np.zeros((len(q), 6)))
 
 
 def difference(plus, minus, by):
@@ -100,7 +100,7 @@ def test_transitions_are_those_of_differences(run):
                 samples,
                 nodes,
                 c,
-                State(multiply(exp(sign * step[:3]), state.q), state.v + sign * step[3:], state.bias),
+                NodeState(multiply(exp(sign * step[:3]), state.q), state.v + sign * step[3:], state.bias),
             )
             for sign in (1.0, -1.0)
         )

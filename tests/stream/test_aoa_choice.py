@@ -13,7 +13,7 @@ from inercal.faces.stream.aoa import Aoa
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import Saving
 from inercal.foundation.records.write import number
-from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.fusion.band import with_rate
 from inercal.systems.aoa.fusion.filter_result import estimate
@@ -98,7 +98,9 @@ def test_angles_beyond_the_limits_are_said_as_they_come():
     """15 deg + 10 deg at 0.25 Hz: each of two excursions above 24 deg once, and the rows of each in their column."""
     run = simulate(Tunnel(duration=7.0, frequency=0.25), 0)
     settings = study(
-        band=Band(np.inf), estimator=Estimator(snap=1e8), alarm=Alarm(lowest=-5.0 * DEG, highest=24.0 * DEG)
+        band=Band(np.inf),
+        estimator=Estimator(snap=1e8),
+        alarm=AlarmLimits(lowest=-5.0 * DEG, highest=24.0 * DEG),
     )
     out, of, said = streamed(text_of(run), settings)
     assert out[0].endswith(",nis [1],status [1],alarm [1]")

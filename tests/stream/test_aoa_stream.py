@@ -26,7 +26,7 @@ from inercal.systems.aoa.reading.from_record import recording_of
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
 from inercal.systems.aoa.result.columns import angles_record
 from inercal.systems.aoa.result.systematic import by_fusion
-from inercal.systems.aoa.settings import Attitude, Calibration, Estimator, Timing, Zero
+from inercal.systems.aoa.settings import Attitude, Estimator, SensorCalibration, Timing, Zero
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure
 
@@ -34,10 +34,10 @@ SHORT = replace(BASE, duration=0.6)
 LONG = replace(BASE, duration=4.2, sample_rate=500.0)
 #: sensors that read counts and volts, with bias, slopes and ranges
 CALIBRATED = {
-    "a1": Calibration(2.5e-3, 0.02, 0.9 * G, 1e-4, 1e-3, 20.0, "count"),
-    "a2": Calibration(1.02, -0.03),
-    "a3": Calibration(0.5 * G, 0.01, 3.0 * G, per="V"),
-    "gyro": Calibration(-20.0 * DEG, 0.01, 40.0 * DEG, per="V"),
+    "a1": SensorCalibration(2.5e-3, 0.02, 0.9 * G, 1e-4, 1e-3, 20.0, "count"),
+    "a2": SensorCalibration(1.02, -0.03),
+    "a3": SensorCalibration(0.5 * G, 0.01, 3.0 * G, per="V"),
+    "gyro": SensorCalibration(-20.0 * DEG, 0.01, 40.0 * DEG, per="V"),
 }
 ROLLED = Attitude(
     roll=parse_quantity("5.0(2) deg", "angle", "roll"), upwash=parse_quantity("0.1(1) deg", "angle", "up")
@@ -120,7 +120,7 @@ def test_lines_are_those_of_the_whole_file_to_the_last_digit(states, tmp_path):
     [
         {"attitude": ROLLED},
         {"timing": replace(study().timing, gyro_delay=None, common_delay=5e-4, common_delay_u=1e-4)},
-        {"sensors": {"a2": Calibration(range=0.6 * G)}},
+        {"sensors": {"a2": SensorCalibration(range=0.6 * G)}},
         {"sensors": CALIBRATED, "disturbances": Disturbances(spikes=1e-3)},
     ],
 )
@@ -285,8 +285,8 @@ def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
     base = study()
     others = [
         study(8),
-        study(sensors={"a1": Calibration(1.01)}),
-        study(sensors={"gyro": Calibration(range=1.0)}),
+        study(sensors={"a1": SensorCalibration(1.01)}),
+        study(sensors={"gyro": SensorCalibration(range=1.0)}),
         study(attitude=ROLLED),
         study(attitude=replace(ROLLED, yaw=ROLLED.upwash)),
         study(zero=Zero(0.0, 1.0, 0.0, 1e-3)),
@@ -319,7 +319,8 @@ def test_what_is_missing_is_said_once_and_gone_without(tmp_path):
 
 def test_saturation_is_said_once_for_each_sensor(tmp_path):
     settings = study(
-        motion=LONG, sensors={"a2": Calibration(range=0.6 * G), "gyro": Calibration(range=40.0 * DEG)}
+        motion=LONG,
+        sensors={"a2": SensorCalibration(range=0.6 * G), "gyro": SensorCalibration(range=40.0 * DEG)},
     )
     said, text = [], recorded(tmp_path, settings)
     live(text, settings, said=said)

@@ -21,7 +21,7 @@ from inercal.systems.selfcal.filters.filter_result import product_form
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import KA1, names
-from inercal.systems.selfcal.platform.plan import Plan, Rest, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.settings import Disturbances, Filter, Gating
@@ -30,7 +30,9 @@ DEG = np.pi / 180.0
 RECURSIVE = ("error-state", "svd-qukf", "gimbal-ukf")
 
 #: through more than half a turn, so that encoders wrap, and away from gimbal lock
-SHORT = Plan((Turn("z", 210 * DEG), Turn("y", 20 * DEG), Rest(4.0), Turn("x", -30 * DEG)), rate=5.0 * DEG)
+SHORT = PlatformPlan(
+    (Turn("z", 210 * DEG), Turn("y", 20 * DEG), Rest(4.0), Turn("x", -30 * DEG)), rate=5.0 * DEG
+)
 
 
 def recorded(tmp_path, seed=1, plan=SHORT, change=lambda rows: rows, **disturbances):
@@ -277,7 +279,7 @@ def test_sound_innovations_are_not_said(tmp_path):
 
 
 def test_gimbal_lock_is_said_where_the_model_does_not_hold(tmp_path):
-    plan = Plan((Turn("y", 95 * DEG),), rate=5.0 * DEG)
+    plan = PlatformPlan((Turn("y", 95 * DEG),), rate=5.0 * DEG)
     said = {}
     for kind in ("gimbal-ukf", "error-state"):
         said[kind] = []

@@ -8,7 +8,7 @@ import numpy as np
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.aoa.disturbances import Disturbances, Shaking
 from inercal.systems.aoa.layout import Layout
-from inercal.systems.aoa.settings import AoaSettings, Calibration, Estimator, MotionPlan, Noise
+from inercal.systems.aoa.settings import AoaSettings, Estimator, MotionPlan, Noise, SensorCalibration
 
 G = 9.80665
 DEG = math.pi / 180.0
@@ -58,8 +58,8 @@ def scenario(name, states=19, **motion):
         "clipping": {
             "disturbances": Disturbances(clip=True),
             "sensors": {
-                **{name: Calibration(range=0.95 * G) for name in ("a1", "a2", "a3")},
-                "gyro": Calibration(range=40.0 * DEG),
+                **{name: SensorCalibration(range=0.95 * G) for name in ("a1", "a2", "a3")},
+                "gyro": SensorCalibration(range=40.0 * DEG),
             },
         },
     }

@@ -8,7 +8,7 @@ from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.settings import Design, Instrument, TurntableSettings
+from inercal.systems.turntable.settings import Instrument, PositionDesign, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)
 DEG_H = parse_unit("deg/h").factor
@@ -56,7 +56,7 @@ def study(
         rig="two_axis_turntable",
         chain=chain or table(0.0),
         plan=plan,
-        design=Design(grid((36, 36))),
+        design=PositionDesign(grid((36, 36))),
         instrument=Instrument(kind=kind, unit=parse_unit(unit), coefficients=coefficients, **instrument),
     )
 

@@ -14,7 +14,7 @@ from sting_text import calibrated, same, study, with_sensor
 from inercal.faces.studies.schema import json_schema
 from inercal.faces.studies.sensors import MOST
 from inercal.foundation.errors import InputError, StudyError
-from inercal.systems.aoa.settings import Calibration
+from inercal.systems.aoa.settings import SensorCalibration
 from rows import for_each
 
 SCHEMA = json_schema()
@@ -54,7 +54,7 @@ def test_biases_and_temperature_terms():
         scale="0.5 g/V", bias="2.5 V", range="2 g", scale_slope="50 ppm/K", bias_slope="-10 ug/degC",
         temperature="25 degC",
     ).calibration("a1")  # fmt: skip
-    expected = Calibration(0.5 * G, 1.25 * G, 2.0 * G, 50e-6, -10e-6 * G, 25.0, "V")
+    expected = SensorCalibration(0.5 * G, 1.25 * G, 2.0 * G, 50e-6, -10e-6 * G, 25.0, "V")
     same(found, expected)
     assert with_sensor(scale="0.5 g/V", bias="3 mg").calibration("a1").bias == pytest.approx(3e-3 * G)
     gyro = with_sensor(name="gyro", bias="0.1 deg/s", bias_slope="1 deg/h/K").calibration("gyro")
@@ -66,7 +66,7 @@ def test_biases_and_temperature_terms():
 )  # fmt: skip
 def test_what_is_indicated_means_what_was_measured(scale, bias, slope, warmer):
     """The calibration and its inverse, at any temperature."""
-    of = Calibration(scale, bias, scale_slope=slope, bias_slope=slope, temperature=20.0)
+    of = SensorCalibration(scale, bias, scale_slope=slope, bias_slope=slope, temperature=20.0)
     value = np.linspace(-20.0, 20.0, 5)
     assert_allclose(of.measured(of.indicated(value, 20.0 + warmer), 20.0 + warmer), value, atol=1e-12)
     # f = indication x scale - bias, by hand

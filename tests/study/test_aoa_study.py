@@ -22,13 +22,21 @@ from inercal.foundation.errors import StudyError
 from inercal.systems.aoa.disturbances import (
     AngleShaking,
     Disturbances,
-    Line,
     Mains,
     Oscillation,
     Plunge,
     Shaking,
+    VibrationLine,
 )
-from inercal.systems.aoa.settings import AoaSettings, Calibration, Estimator, Methods, MotionPlan, Prior, Zero
+from inercal.systems.aoa.settings import (
+    AoaSettings,
+    Estimator,
+    Methods,
+    MotionPlan,
+    Prior,
+    SensorCalibration,
+    Zero,
+)
 from rows import for_each
 
 SCHEMA = json_schema()
@@ -53,7 +61,7 @@ def test_the_study_of_the_contract(write):
     same(found.motion, scenario("base").motion)
     assert (found.site.gravity, found.site.latitude) == (9.80665, pytest.approx(40.0 * DEG))
     assert found.sensors.keys() == {"a1", "a2", "a3", "gyro"}
-    same(found.calibration("gyro"), Calibration(range=40.0 * DEG))
+    same(found.calibration("gyro"), SensorCalibration(range=40.0 * DEG))
     assert found.timing.gyro_delay is None
     assert (found.timing.common_delay, found.timing.common_delay_u) == pytest.approx((0.5e-3, 0.1e-3))
     assert found.estimator == Estimator(19, prior=file.parent / "last.json")
@@ -131,8 +139,8 @@ def test_all_that_settings_hold_is_reached():
     expected = Disturbances(
         roll=Oscillation(DEG, 8.0), yaw=Oscillation(2 * DEG, 3.0), gyro_scale=1e-3, gyro_delay=2e-3,
         common_delay=-1e-3, bandwidth=100.0, spikes=1e-4, spike=G, dropouts=0.01, clip=True,
-        lines=(Line(112.0, 0.3 * G), Line(47.0, 1e-3 * G, 2e-3 * G)), local_vibration=Shaking(0.5 * G, 120.0, 240.0),
-        mains=Mains(0.05 * G), buffet=AngleShaking(0.1 * DEG, 5.0, 60.0), plunge=Plunge(0.02 * G, 2.0),
+        lines=(VibrationLine(112.0, 0.3 * G), VibrationLine(47.0, 1e-3 * G, 2e-3 * G)), local_vibration=Shaking(0.5 * G,
+        120.0, 240.0), mains=Mains(0.05 * G), buffet=AngleShaking(0.1 * DEG, 5.0, 60.0), plunge=Plunge(0.02 * G, 2.0),
         axis_errors=(0.0, 0.3 * DEG, -1e-3), rectification=500e-6 / G, bias_drift=(0.0, 1e-3 * G, 0.0),
         stamp_jitter=1e-4, sample_rates={"gyro": 250.0, "a2": 500.0},
     )  # fmt: skip

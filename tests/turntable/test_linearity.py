@@ -14,7 +14,7 @@ from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.rate.calibration import calibrate_rates
 from inercal.systems.turntable.rate.linearity import Deviations, largest
-from inercal.systems.turntable.settings import Design, Instrument, RateTest, TurntableSettings
+from inercal.systems.turntable.settings import Instrument, PositionDesign, RateTest, TurntableSettings
 
 EARTH = 7.292115e-5
 LATITUDE = np.radians(39.1)
@@ -47,7 +47,7 @@ def estimate_of(rate, deviation, noise, stated, rng):
         rig="two_axis_turntable",
         chain=turntable("two_axis_turntable", None),
         plan=named("24-position"),
-        design=Design(named("24-position")),
+        design=PositionDesign(named("24-position")),
         instrument=Instrument(kind="gyro", noise=noise * full if stated else None),
         rate_test=RateTest("phi2"),
     )

@@ -14,7 +14,7 @@ from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.model import table_model
 from inercal.systems.turntable.positions.planning import design
 from inercal.systems.turntable.regression import fit
-from inercal.systems.turntable.settings import Design
+from inercal.systems.turntable.settings import PositionDesign
 from inercal.systems.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
@@ -72,6 +72,6 @@ def test_noise_that_drowns_in_one_error_of_the_table_stops_no_design():
     for a millionth of it at least; where the error does not act, that is all there is."""
     wobbling = turntable("two_axis_turntable", None, {"dphi_y1": uniform(2.0 * ARCMIN)})
     posed = study(chain=wobbling, noise=1e-13 * DEG_H, terms=("DX_F", "DY_F"))
-    made = design(replace(posed, design=Design(grid((6, 6)), positions=4)))
+    made = design(replace(posed, design=PositionDesign(grid((6, 6)), positions=4)))
     assert made.compare[0].figures.rank == made.compare[0].terms == 1
     assert np.all(made.compare[0].figures.u < 1e-6 * DEG_H)

@@ -23,7 +23,7 @@ from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.figures import pictures
 from inercal.systems.turntable.rate.fit import approaches, levels
 from inercal.systems.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
-from inercal.systems.turntable.settings import Design, Instrument, RateTest, TurntableSettings
+from inercal.systems.turntable.settings import Instrument, PositionDesign, RateTest, TurntableSettings
 from inercal.systems.turntable.task import calibrate, simulate
 
 DEG = np.pi / 180.0
@@ -44,7 +44,7 @@ def study(rates=UP_AND_DOWN, errors=None, mounting=None, instrument=None, scopes
         rig="two_axis_turntable",
         chain=turntable("two_axis_turntable", errors, scopes=scopes, mounting=mounting),
         plan=named("24-position"),
-        design=Design(named("24-position")),
+        design=PositionDesign(named("24-position")),
         instrument=Instrument(**(made | (instrument or {}))),
         rate_test=RateTest("phi2", rates=rates, **test),
     )

@@ -24,7 +24,7 @@ from inercal.systems.turntable.figures import pictures
 from inercal.systems.turntable.figures.design import page as design_page
 from inercal.systems.turntable.positions.planning import design
 from inercal.systems.turntable.positions.simulate import simulate
-from inercal.systems.turntable.settings import Design, Instrument, TurntableSettings
+from inercal.systems.turntable.settings import Instrument, PositionDesign, TurntableSettings
 from inercal.systems.turntable.task import calibrate
 
 DEG_H = parse_unit("deg/h")
@@ -61,7 +61,12 @@ def study(plan, instrument, half_width=2.0 * ARCMIN, **changes):
     chain = turntable("two_axis_turntable", None if half_width is None else uniform(half_width))
     site = Site(9.8, latitude=np.radians(39.1))
     return TurntableSettings(
-        site, "two_axis_turntable", chain, plan, Design(grid((12, 12)), **changes), instrument=instrument
+        site,
+        "two_axis_turntable",
+        chain,
+        plan,
+        PositionDesign(grid((12, 12)), **changes),
+        instrument=instrument,
     )
 
 

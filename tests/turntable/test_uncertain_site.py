@@ -25,7 +25,7 @@ from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.positions.planning import design
-from inercal.systems.turntable.settings import Design, RateTest
+from inercal.systems.turntable.settings import PositionDesign, RateTest
 from inercal.systems.turntable.task import calibrate, simulate
 
 NOISE = 0.01 * DEG_H
@@ -86,7 +86,7 @@ def test_only_what_acts_is_named():
     )
     (said,) = remarks(calibrated(of_force).findings)
     assert said.startswith("u of K1_x, K1_y, K1_z is mostly of what [site] states (gravity): ")
-    few = Design(grid((7, 8)), positions=40, compare=())
+    few = PositionDesign(grid((7, 8)), positions=40, compare=())
     (said,) = remarks(design(replace(of_force, chain=table(), design=few)).findings)
     assert "so uncertain (gravity) that" in said
 
@@ -106,7 +106,7 @@ def test_a_rate_test_says_so_too():
 
 def test_a_design_says_what_a_better_latitude_would_be_worth():
     """The number it names is that of the same positions at an exact site."""
-    few = Design(grid((12, 12)), positions=24, compare=())
+    few = PositionDesign(grid((12, 12)), positions=24, compare=())
     made = {u: design(replace(at(u, chain=table()), design=few)) for u in (0.0, 0.3)}
     assert not remarks(made[0.0].findings)
     (said,) = remarks(made[0.3].findings)

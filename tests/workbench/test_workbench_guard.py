@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.bench.workbench.guard import LARGEST_BODY, POLICY, Guard, Key
+from inercal.bench.workbench.guard import LARGEST_BODY, POLICY, AccessKey, Guard
 
 HERE, SECRET = "127.0.0.1:8000", "s3cret-of-this-run"
 
@@ -46,7 +46,7 @@ def asked(path="/", host=HERE, method="GET", kind="http", query=b"", pieces=(b""
     async def send(message):
         sent.append(message)
 
-    guard = Guard(inner, Key(SECRET, password), frozenset({"localhost"}))
+    guard = Guard(inner, AccessKey(SECRET, password), frozenset({"localhost"}))
     asyncio.run(guard(scope, receive, send))
     return sent
 
@@ -63,7 +63,7 @@ BEARER = {"authorization": f"Bearer {SECRET}"}
 
 
 def test_the_key_opens_as_a_bearer_token_or_a_cookie():
-    cookie = Key(SECRET).cookie
+    cookie = AccessKey(SECRET).cookie
     assert status(asked(**BEARER)) == 200
     assert status(asked(cookie=f"other=1; {cookie}={SECRET}")) == 200
     assert status(asked(cookie=f"{cookie}=wrong")) == 401
@@ -75,7 +75,7 @@ def test_the_key_in_the_address_becomes_a_cookie_and_leaves_the_address():
     assert status(answer) == 303
     assert head(answer, b"location") == b"/sessions/0001/run?new=1"
     cookie = head(answer, b"set-cookie").decode()
-    assert cookie.startswith(f"{Key(SECRET).cookie}={SECRET};")
+    assert cookie.startswith(f"{AccessKey(SECRET).cookie}={SECRET};")
     assert "HttpOnly" in cookie
     assert "SameSite=Strict" in cookie
 

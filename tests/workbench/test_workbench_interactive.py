@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from inercal.bench.workbench.interactive import figure
-from inercal.faces.report.marks import Axis, Band, Bars, Dots, Level, Line, Note, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Bars, Dots, Level, Line, Note, Panel, Strips
 
 
 def test_every_mark_is_a_trace_or_a_shape():
     x = np.array([0.0, 1.0, np.nan])
     panels = [
-        Panel([Line(x, x, "line", width=1.0), Band(x, x - 1.0, x + 1.0, "band")], y=Axis("acc [m/s²]")),
+        Panel([Line(x, x, "line", width=1.0), Area(x, x - 1.0, x + 1.0, "band")], y=Axis("acc [m/s²]")),
         Panel(
             [Level(0.0), Dots([2.0], [3.0], "dots", words=["pose 1"])],
             Axis("time [s]", limits=(0.0, 9.0)),

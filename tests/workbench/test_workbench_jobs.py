@@ -10,7 +10,7 @@ import time
 import pytest
 
 from inercal.bench.workbench import jobs
-from inercal.bench.workbench.jobs import Queue, State
+from inercal.bench.workbench.jobs import JobState, Queue
 from inercal.examples import FOLDER
 from inercal.foundation.errors import InputError
 
@@ -30,14 +30,14 @@ def queue(tmp_path):
 
 def test_a_job_leaves_what_its_command_says_and_its_exit_code(queue, tmp_path):
     job = queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0)
-    assert (job.state, job.code) == (State.DONE, 0)
+    assert (job.state, job.code) == (JobState.DONE, 0)
     assert json.loads((job.folder / "printed").read_text())["status"]["code"] == "ok"
     assert job.command == "inercal examples --json --quiet"
 
 
 def test_a_refusal_is_one_sentence(queue, tmp_path):
     job = queue.wait(queue.add("0001", tmp_path, ["inspect", "absent.csv"]).id, 60.0)
-    assert (job.state, job.code) == (State.REFUSED, 2)
+    assert (job.state, job.code) == (JobState.REFUSED, 2)
     assert job.said.startswith("inercal: error: absent.csv: ")
     assert job.said.count("\n") == 1
 
@@ -45,23 +45,23 @@ def test_a_refusal_is_one_sentence(queue, tmp_path):
 def test_a_folder_that_has_gone_refuses_the_job_and_the_next_one_runs(queue, tmp_path):
     gone = queue.add("0001", tmp_path / "gone", LISTS)
     after = queue.add("0001", tmp_path, LISTS)
-    assert queue.wait(after.id, 60.0).state is State.DONE
-    assert queue.get(gone.id).state is State.REFUSED
+    assert queue.wait(after.id, 60.0).state is JobState.DONE
+    assert queue.get(gone.id).state is JobState.REFUSED
 
 
 def test_jobs_come_one_after_the_other_and_cancelling_ends_both_kinds(queue, tmp_path):
     running, waiting = queue.add("0001", tmp_path, LONG), queue.add("0001", tmp_path, LISTS)
     until = time.monotonic() + 30.0
-    while queue.get(running.id).state is State.WAITING and time.monotonic() < until:
+    while queue.get(running.id).state is JobState.WAITING and time.monotonic() < until:
         time.sleep(0.02)
-    assert [queue.get(job.id).state for job in (running, waiting)] == [State.RUNNING, State.WAITING]
+    assert [queue.get(job.id).state for job in (running, waiting)] == [JobState.RUNNING, JobState.WAITING]
     queue.cancel(waiting.id)
     began = time.monotonic()
     queue.cancel(running.id)
-    assert queue.wait(running.id, 30.0).state is State.CANCELLED
+    assert queue.wait(running.id, 30.0).state is JobState.CANCELLED
     assert time.monotonic() - began < 15.0
-    assert [queue.get(job.id).state for job in (running, waiting)] == [State.CANCELLED, State.CANCELLED]
-    assert queue.wait(queue.again(waiting.id).id, 60.0).state is State.DONE
+    assert [queue.get(job.id).state for job in (running, waiting)] == [JobState.CANCELLED, JobState.CANCELLED]
+    assert queue.wait(queue.again(waiting.id).id, 60.0).state is JobState.DONE
 
 
 def test_an_unknown_job_is_refused(queue):
@@ -107,16 +107,16 @@ def test_after_kill_9_jobs_are_done_or_plainly_interrupted_and_the_rest_goes_on(
     assert not os.path.exists(f"/proc/{child}")
     queue = Queue(tmp_path / "jobs")
     try:
-        assert queue.get("00001").state is State.DONE
-        assert queue.get("00002").state is State.INTERRUPTED
-        assert queue.wait("00003", 60.0).state is State.DONE
+        assert queue.get("00001").state is JobState.DONE
+        assert queue.get("00002").state is JobState.INTERRUPTED
+        assert queue.wait("00003", 60.0).state is JobState.DONE
     finally:
         queue.close()
 
 
 def test_a_module_of_python_among_the_files_of_a_session_is_not_run(queue, tmp_path):
     (tmp_path / "json.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
-    assert queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0).state is State.DONE
+    assert queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0).state is JobState.DONE
     assert not (tmp_path / "ran").exists()
 
 
@@ -134,8 +134,8 @@ def test_an_argument_that_is_no_text_is_no_job(queue, tmp_path, words, named):
 def test_an_argument_that_is_too_long_refuses_the_job_and_the_next_one_runs(queue, tmp_path):
     long = queue.add("0001", tmp_path, ["inspect", "x" * 3_000_000])
     after = queue.add("0001", tmp_path, LISTS)
-    assert queue.wait(after.id, 60.0).state is State.DONE
-    assert (queue.get(long.id).state, queue.get(long.id).code) == (State.REFUSED, 2)
+    assert queue.wait(after.id, 60.0).state is JobState.DONE
+    assert (queue.get(long.id).state, queue.get(long.id).code) == (JobState.REFUSED, 2)
     assert queue.get(long.id).said.count("\n") == 1
 
 
@@ -153,8 +153,8 @@ def test_whatever_befalls_a_job_the_next_one_runs(queue, tmp_path, monkeypatch, 
 
     monkeypatch.setattr(jobs, "_begun", failing)
     first, second = queue.add("0001", tmp_path, LISTS), queue.add("0001", tmp_path, LISTS)
-    assert queue.wait(second.id, 60.0).state is State.DONE
-    assert queue.get(first.id).state is State.REFUSED
+    assert queue.wait(second.id, 60.0).state is JobState.DONE
+    assert queue.get(first.id).state is JobState.REFUSED
     assert queue.get(first.id).said.startswith("inercal: error: ")
 
 
@@ -166,7 +166,7 @@ def test_a_disk_that_is_full_refuses_what_comes_and_ends_nothing(queue, tmp_path
         patch.setattr(jobs, "write_text", full)
         with pytest.raises(InputError, match="No space left"):
             queue.add("0001", tmp_path, LISTS)
-    assert queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0).state is State.DONE
+    assert queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0).state is JobState.DONE
 
 
 SOUND = {
@@ -203,7 +203,7 @@ def test_a_job_that_an_earlier_workbench_left_spoiled_is_told_or_left_out(spoile
     try:
         told = [json.dumps(_of_job(job), ensure_ascii=False).encode() for job in queue]
         assert 1 <= len(told) <= 2
-        assert not [job for job in queue if job.state in (State.WAITING, State.RUNNING)]
+        assert not [job for job in queue if job.state in (JobState.WAITING, JobState.RUNNING)]
         assert queue.wait(queue.add("0001", tmp_path, LISTS).id, 60.0).id == "00004"
         assert Bench(tmp_path, Sessions(tmp_path), queue).last_design is not None
     finally:
@@ -232,7 +232,7 @@ def test_a_job_that_somebody_put_into_the_folder_is_refused(arguments, expected,
     queue = Queue(tmp_path / "work" / "jobs")
     try:
         job = queue.get("00001")
-        assert (job.state, job.code) == (State.REFUSED, 2)
+        assert (job.state, job.code) == (JobState.REFUSED, 2)
         assert expected in job.said
         assert job.said.count("\n") == 1
         with pytest.raises(InputError, match="expected"):
@@ -268,7 +268,7 @@ def test_a_stored_job_reads_only_files_of_its_work_folder(way, tmp_path):
     queue = Queue(tmp_path / "work" / "jobs")
     try:
         job = queue.get("00001")
-        assert job.state is State.REFUSED, job.said
+        assert job.state is JobState.REFUSED, job.said
         assert "expected" in job.said
     finally:
         queue.close()

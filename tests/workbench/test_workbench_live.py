@@ -169,7 +169,7 @@ def test_no_wish_leads_out_of_the_session(bench, wish, words):
 
 
 def test_a_session_is_measured_once_and_so_many_at_a_time(bench, monkeypatch):
-    monkeypatch.setattr("inercal.bench.live.measurement.Measurement.start", lambda self: None)
+    monkeypatch.setattr("inercal.bench.live.measurement.RunningMeasurement.start", lambda self: None)
     sessions = [bench.sessions.begin_with("sting") for _ in range(MOST + 1)]
     for session in sessions[:MOST]:
         bench.measurements.begin(session, Wish("udp://127.0.0.1:5005"))

@@ -6,7 +6,7 @@ import tomllib
 
 import pytest
 
-from inercal.bench.workbench.jobs import State
+from inercal.bench.workbench.jobs import JobState
 from inercal.examples import EXAMPLES
 from inercal.systems.listed import SYSTEMS
 from rows import for_each
@@ -23,7 +23,7 @@ async def run(bench, session):
     """The calibration of a session, to its end."""
     job = bench.run(session)
     ended = await asyncio.to_thread(bench.queue.wait, job.id, 120.0)
-    assert ended.state is State.DONE, ended.said
+    assert ended.state is JobState.DONE, ended.said
     return ended
 
 
@@ -186,7 +186,7 @@ async def test_layouts_of_a_model_are_set_side_by_side(user, bench):
     user.find("Compare").click()
     await user.should_see("The comparison (job", retries=20)
     ended = await asyncio.to_thread(bench.queue.wait, bench.last_design(session).id, 120.0)
-    assert ended.state is State.DONE, ended.said
+    assert ended.state is JobState.DONE, ended.said
     await user.should_see("is done", retries=40)
     await user.should_not_see("Take the plan found")
     assert "Layouts side by side" in ended.report.read_text()

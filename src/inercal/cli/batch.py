@@ -13,7 +13,7 @@ from inercal.cli import EXIT_BAD_VERDICT, command_line
 from inercal.cli.options import (
     ClusterOption,
     MapFile,
-    Output,
+    OutputOptions,
     Overrides,
     StoreOption,
     StudyFile,
@@ -27,7 +27,7 @@ from inercal.foundation.errors import InputError
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class FolderOutput(Output):
+class FolderOutput(OutputOptions):
     """The options of a command that writes a folder."""
 
     out: Annotated[Path | None, Parameter(help="Folder of the outcome; made if it is not there.")] = None

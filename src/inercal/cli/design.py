@@ -22,7 +22,7 @@ from inercal.cli.options import (
 from inercal.cli.outcome import WHOLE, give
 
 if TYPE_CHECKING:
-    from inercal.systems.selfcal.platform.plan import Plan
+    from inercal.systems.selfcal.platform.plan import PlatformPlan
     from inercal.systems.turntable.settings import TurntableSettings
 
 
@@ -155,7 +155,7 @@ def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings
     return "\n".join([head, *rows]) + "\n"
 
 
-def _plan(plan: Plan, message: str) -> str:
+def _plan(plan: PlatformPlan, message: str) -> str:
     """A plan as the table of a study."""
     from inercal.systems.selfcal.before.path_design import stated_moves
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import InstrumentOption, Output, ReportOutput, StoreOption, working
+from inercal.cli.options import InstrumentOption, OutputOptions, ReportOutput, StoreOption, working
 from inercal.cli.outcome import emit, say_findings
 from inercal.foundation.errors import InercalError, InputError
 from inercal.foundation.results.shown import aligned
@@ -28,7 +28,7 @@ def keep(
     *,
     instrument: InstrumentOption = None,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
     report: Annotated[Path | None, Parameter(help="Its report, kept beside it.")] = None,
 ) -> None:
     """Keep a result that was made elsewhere."""
@@ -57,7 +57,7 @@ def keep(
     emit(without_coefficients("keep", words, data, (source_of(result),)), words, output)
 
 
-def instruments(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+def instruments(*, store: StoreOption = None, output: OutputOptions = OutputOptions()) -> None:  # noqa: B008  (frozen)
     """List the instruments of a store."""
     from inercal.foundation.records.places import counted
     from inercal.foundation.results.result import without_coefficients
@@ -79,7 +79,7 @@ def results(
     since: Annotated[str | None, Parameter(help='First day, such as "2026-01-31".')] = None,
     status: Annotated[str | None, Parameter(help='Only results of this status, such as "ok".')] = None,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """List the results of a store."""
     from datetime import date
@@ -168,7 +168,7 @@ def supersede(
     *,
     reason: Annotated[str, Parameter(help="Why, in words.")],
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Say that a result takes the place of another."""
     from inercal.foundation.results.result import without_coefficients
@@ -188,7 +188,7 @@ def rerun(
     /,
     *,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> int:
     """Make a kept result once more, and set the new one beside it."""
     import json

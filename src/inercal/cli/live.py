@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_INTERRUPTED, abandon_output
-from inercal.cli.options import MapFile, Output, Overrides
+from inercal.cli.options import MapFile, OutputOptions, Overrides
 from inercal.cli.streaming import Every, StreamOptions, interval_of
 from inercal.foundation.errors import InercalError, InputError
 
 if TYPE_CHECKING:
     from inercal.bench.live.address import Sink
-    from inercal.bench.live.measurement import Measurement
+    from inercal.bench.live.measurement import RunningMeasurement
     from inercal.faces.stream.estimators import Make, Say, SayFinding
 
 _EVERY = 30.0
@@ -55,11 +55,11 @@ def live(
     map_file: MapFile = None,
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> int:
     """Measure an instrument by wire."""
     from inercal.bench.live.address import sink_of, source_of
-    from inercal.bench.live.measurement import Measurement, Plan
+    from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement
     from inercal.faces.stream.run import Saving
 
     wire = source_of(source)
@@ -79,8 +79,8 @@ def live(
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
     make = _estimator(study, calibration, overrides or [], interval_of(every))
-    plan = Plan(wire, make, record_map, record, sinks, saving)
-    return _followed(Measurement(plan, output.say, output.say_finding, _print), output)
+    plan = MeasurementPlan(wire, make, record_map, record, sinks, saving)
+    return _followed(RunningMeasurement(plan, output.say, output.say_finding, _print), output)
 
 
 def _estimator(
@@ -135,7 +135,7 @@ def _place(sink: Sink) -> Path | None:
     return place
 
 
-def _followed(measurement: Measurement, output: Output) -> int:
+def _followed(measurement: RunningMeasurement, output: OutputOptions) -> int:
     """Run a measurement until it ends or is asked to, and say what became of its rows; the exit code."""
     asked, due = False, time.monotonic() + _EVERY
     measurement.start()

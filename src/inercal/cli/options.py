@@ -55,7 +55,7 @@ _LONG = 10.0
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Output:
+class OutputOptions:
     """The common options of every command."""
 
     json: Annotated[bool, Parameter(help="Print one JSON object, and nothing else, on standard output.")] = (
@@ -94,7 +94,7 @@ class Output:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class FileOutput(Output):
+class FileOutput(OutputOptions):
     """The options of a command that writes a file."""
 
     out: Annotated[Path | None, Parameter(help="Write the result to this file.")] = None
@@ -326,7 +326,7 @@ def place_of(workers: int | None, cluster: str | None) -> Executor:
 
 
 @contextmanager
-def working(output: Output) -> Iterator[Callable[[str], None]]:
+def working(output: OutputOptions) -> Iterator[Callable[[str], None]]:
     """A callback (text) that shows progress on a terminal and leaves nothing; elsewhere see `_once`."""
     if PROGRESS in os.environ:
         yield partial(_last_words, Path(os.environ[PROGRESS]))
@@ -340,7 +340,7 @@ def working(output: Output) -> Iterator[Callable[[str], None]]:
         yield status.update
 
 
-def _once(output: Output) -> Callable[[str], None]:
+def _once(output: OutputOptions) -> Callable[[str], None]:
     """A callback (text) that says one line in a log, and only of what lasts."""
     due = time.perf_counter() + _LONG
 
@@ -354,7 +354,7 @@ def _once(output: Output) -> Callable[[str], None]:
 
 
 @contextmanager
-def reading(output: Output, what: str = "reading") -> Iterator[Callable[[int, int], None] | None]:
+def reading(output: OutputOptions, what: str = "reading") -> Iterator[Callable[[int, int], None] | None]:
     """A callback (done, total) that shows a bar on a terminal once a second has passed; elsewhere see `_once`."""
     if PROGRESS in os.environ:
         path = Path(os.environ[PROGRESS])

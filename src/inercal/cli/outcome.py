@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from inercal.cli import EXIT_BAD_VERDICT, command_line, process_age
-from inercal.cli.options import Output, ReportOutput, ResultOutput
+from inercal.cli.options import OutputOptions, ReportOutput, ResultOutput
 
 if TYPE_CHECKING:
     from inercal.faces.python.result import Result
@@ -22,7 +22,7 @@ _SHOWN = 3
 """Findings told one by one beside a result, those that harm most; more would hide the verdict below them."""
 
 
-def say_findings(findings: Iterable[Finding], output: Output) -> None:
+def say_findings(findings: Iterable[Finding], output: OutputOptions) -> None:
     """The findings that harm most, one a line with its action, and how many more there are.
 
     A single one more is told itself, in the place of the line that would count it.
@@ -38,7 +38,7 @@ def say_findings(findings: Iterable[Finding], output: Output) -> None:
         output.say(f"{len(ordered) - told} more findings: {'in the JSON' if output.json else whole}")
 
 
-def emit(estimate: Estimate, text: str, output: Output) -> None:
+def emit(estimate: Estimate, text: str, output: OutputOptions) -> None:
     """The result on standard output: the JSON object with the time of the whole process, or the text for people."""
     from inercal.foundation.results.files import to_json
 

@@ -6,7 +6,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from inercal.cli.options import Files, MapFile, Output, ReportOutput, ResultOutput, Span, read_record, working
+from inercal.cli.options import (
+    Files,
+    MapFile,
+    OutputOptions,
+    ReportOutput,
+    ResultOutput,
+    Span,
+    read_record,
+    working,
+)
 from inercal.cli.outcome import WHOLE, emit, give, timed
 from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
 
@@ -88,7 +97,7 @@ def monitor(
     map_file: MapFile = None,
     every: Every = None,
     streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Tell rest from motion, live, and measure the noise at rest."""
     from inercal.faces.stream.estimators import monitor as prepared

@@ -16,7 +16,7 @@ from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.faces.convert.correction import Model
+    from inercal.faces.convert.correction import CalibratedInstrument
     from inercal.faces.convert.other_tools import Converted
     from inercal.foundation.findings import Finding
     from inercal.foundation.results.result import Estimate
@@ -82,7 +82,9 @@ def apply(
     emit(without_coefficients("apply", words, result, inputs, findings), words, output)
 
 
-def usable(calibration: Path, uncertainty: bool = False) -> tuple[Model, tuple[Finding, ...], Estimate]:
+def usable(
+    calibration: Path, uncertainty: bool = False
+) -> tuple[CalibratedInstrument, tuple[Finding, ...], Estimate]:
     """The instrument of a calibration that was saved, what to say of that, and the calibration."""
     from inercal.faces.convert.models import model_of, worth_knowing
     from inercal.faces.python.calibrations import read_estimate

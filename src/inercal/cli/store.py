@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import Output, StoreOption, reading
+from inercal.cli.options import OutputOptions, StoreOption, reading
 from inercal.cli.outcome import emit
 
 
@@ -18,7 +18,7 @@ def store_init(
     objects: Annotated[
         str | None, Parameter(help="Folder or URL of the objects; a database needs it, a folder has its own.")
     ] = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Make an empty store."""
     from inercal.foundation.results.result import without_coefficients
@@ -33,7 +33,7 @@ def store_init(
     )
 
 
-def store_upgrade(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+def store_upgrade(*, store: StoreOption = None, output: OutputOptions = OutputOptions()) -> None:  # noqa: B008  (frozen)
     """Bring a store to the version of this inercal."""
     from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.store import upgrade_store
@@ -46,7 +46,7 @@ def store_upgrade(*, store: StoreOption = None, output: Output = Output()) -> No
     emit(without_coefficients("store upgrade", words, result), words, output)
 
 
-def store_check(*, store: StoreOption = None, output: Output = Output()) -> int:  # noqa: B008  (frozen)
+def store_check(*, store: StoreOption = None, output: OutputOptions = OutputOptions()) -> int:  # noqa: B008  (frozen)
     """Check chain, rows, objects and foreign keys of a store."""
     from inercal.foundation.records.places import counted
     from inercal.foundation.results.result import without_coefficients
@@ -66,7 +66,7 @@ def store_check(*, store: StoreOption = None, output: Output = Output()) -> int:
     return EXIT_BAD_VERDICT if found.faults else 0
 
 
-def store_scrub(*, store: StoreOption = None, output: Output = Output()) -> None:  # noqa: B008  (frozen)
+def store_scrub(*, store: StoreOption = None, output: OutputOptions = OutputOptions()) -> None:  # noqa: B008  (frozen)
     """Take secrets of addresses out of a store of inercal 0.2.0 or earlier."""
     from inercal.foundation.records.places import counted
     from inercal.foundation.results.result import without_coefficients
@@ -96,7 +96,7 @@ def store_export(
     /,
     *,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Copy a store into a folder, which is a store itself."""
     from inercal.foundation.results.result import without_coefficients
@@ -114,7 +114,7 @@ def store_import(
     /,
     *,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Add the results of another store."""
     from inercal.foundation.records.places import counted

@@ -18,7 +18,7 @@ from inercal.cli import abandon_output
 from inercal.cli.options import (
     CheckpointOption,
     FileOutput,
-    Output,
+    OutputOptions,
     ReportOutput,
     ResultOutput,
     Span,
@@ -76,7 +76,7 @@ class StreamOptions:
 
         return -math.inf if self.after is None else parse_quantity(self.after, "time", "--after").value
 
-    def check(self, output: Output, inputs: Iterable[Path | None]) -> None:
+    def check(self, output: OutputOptions, inputs: Iterable[Path | None]) -> None:
         """Fail before any work is done where lines or state could not be written; raises `InputError`."""
         given = {
             "--json": output.json,
@@ -160,7 +160,7 @@ def run_stream(
     estimator: Estimators,
     file: Path | None,
     map_file: Path | None,
-    output: Output,
+    output: OutputOptions,
     options: StreamOptions,
 ) -> None:
     """Run the estimator that is made for the columns of a stream, from its lines to lines on standard output.

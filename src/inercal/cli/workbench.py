@@ -10,7 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from inercal.cli.options import Output, StoreOption
+from inercal.cli.options import OutputOptions, StoreOption
 from inercal.cli.outcome import timed
 from inercal.foundation.errors import InputError
 
@@ -34,7 +34,7 @@ def workbench(
     ] = "127.0.0.1",
     browser: Annotated[bool, Parameter(name="--no-browser", negative="", help="Open no browser.")] = False,
     store: StoreOption = None,
-    output: Output = Output(),  # noqa: B008  (frozen)
+    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
 ) -> None:
     """Serve the workbench until it is asked to end."""
     from platformdirs import user_data_path

@@ -12,7 +12,7 @@ from typing import Literal
 from inercal.foundation._files import read_bytes, write_bytes
 from inercal.foundation.errors import InputError, plain
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.catalog import Shown
+from inercal.laboratory.catalog import ShownResult
 from inercal.laboratory.store import Store
 
 Same = Literal["equal", "within u", "changed", "missing", "new"]
@@ -57,7 +57,7 @@ class LaidOut:
             raise InputError(path, "lies outside the files kept with the result, expected one of them")
 
 
-def laid_out(store: Store, shown: Shown, root: Path) -> LaidOut:
+def laid_out(store: Store, shown: ShownResult, root: Path) -> LaidOut:
     """Lay the files of a result out below ``root`` (empty) as they lay when it was made.
 
     Raises `InputError` where a file was kept by reference and is gone or changed, or has a path that none can have.
@@ -120,7 +120,7 @@ def _bytes(store: Store, path: str, sha256: str, place: str | None) -> bytes:
 
 
 @dataclass(frozen=True)
-class Beside:
+class Repeated:
     """A coefficient of both results: how the new value stands to the old."""
 
     name: str
@@ -131,7 +131,7 @@ class Beside:
     same: Same
 
 
-def beside(old: Estimate, new: Estimate) -> list[Beside]:
+def beside(old: Estimate, new: Estimate) -> list[Repeated]:
     """The coefficients of both, those of the old result first.
 
     Values and uncertainties are ``equal`` to the last digit, ``within u`` where the value moved by at most u of the old
@@ -140,7 +140,7 @@ def beside(old: Estimate, new: Estimate) -> list[Beside]:
     rows = []
     for name, p in old.parameters.items():
         if name not in new.parameters:
-            rows.append(Beside(name, p.value, float("nan"), p.u, p.unit, "missing"))
+            rows.append(Repeated(name, p.value, float("nan"), p.u, p.unit, "missing"))
             continue
         q = new[name]
         same: Same = "changed"
@@ -148,9 +148,9 @@ def beside(old: Estimate, new: Estimate) -> list[Beside]:
             same = "equal"
         elif p.unit == q.unit and abs(q.value - p.value) <= p.u:
             same = "within u"
-        rows.append(Beside(name, p.value, q.value, p.u, p.unit, same))
+        rows.append(Repeated(name, p.value, q.value, p.u, p.unit, same))
     rows += [
-        Beside(name, float("nan"), q.value, q.u, q.unit, "new")
+        Repeated(name, float("nan"), q.value, q.u, q.unit, "new")
         for name, q in new.parameters.items()
         if name not in old.parameters
     ]

@@ -18,17 +18,17 @@ from inercal.laboratory.database import engine_of, migrate, reading, writing
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
 from inercal.laboratory.tables import (
-    Base,
-    Certificate,
     Certified,
-    Coefficient,
-    Instrument,
-    Recording,
-    Reference,
-    Result,
+    IssuedCertificate,
     Setting,
     SourceOf,
+    StoredCoefficient,
+    StoredFile,
+    StoredInstrument,
+    StoredReference,
+    StoredResult,
     Supersession,
+    Tables,
     Used,
 )
 
@@ -71,7 +71,7 @@ def _copy(store: Store, folder: Path, progress: Progress) -> None:
     migrate(engine, str(folder))
     # the lock of a writer, so that all tables are of one moment
     with writing(store.engine, store.where) as source, writing(engine, str(folder)) as target:
-        for table in Base.metadata.sorted_tables:
+        for table in Tables.metadata.sorted_tables:
             rows = [dict(row) for row in source.execute(select(table)).mappings()]
             if table.name == Setting.__tablename__:
                 rows = [row for row in rows if row["key"] != "objects"]
@@ -90,7 +90,7 @@ def _copy_objects(source: Objects, target: Objects, names: set[str], progress: P
 
 
 @dataclass(frozen=True)
-class Added:
+class Imported:
     """Numbers of results, supersessions and certificates that an import added, and of results that were there."""
 
     results: int
@@ -99,7 +99,7 @@ class Added:
     there: int
 
 
-def import_store(store: Store, folder: Path, progress: Progress = None) -> Added:
+def import_store(store: Store, folder: Path, progress: Progress = None) -> Imported:
     """Add what the store in a folder has and this one lacks; its chain must be whole.
 
     Raises `InputError` where the folder is no store, or was changed.
@@ -110,7 +110,7 @@ def import_store(store: Store, folder: Path, progress: Progress = None) -> Added
         raise InputError(folder, f"{checked.faults[0]}, expected a store as it was written")
     _copy_objects(other.objects, store.objects, other.objects.names(), progress)
     with reading(other.engine, other.where) as source:
-        theirs = {table.name: _rows(source, table) for table in Base.metadata.sorted_tables}
+        theirs = {table.name: _rows(source, table) for table in Tables.metadata.sorted_tables}
     with writing(store.engine, store.where) as target:
         return _merged(target, theirs, checked.head)
 
@@ -120,23 +120,25 @@ def _rows(connection: Connection, table: Table) -> list[dict[str, Any]]:
     return [dict(row) for row in connection.execute(select(table)).mappings()]
 
 
-def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: str) -> Added:
+def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: str) -> Imported:
     """The rows of another store that are new, added with an event each."""
     numbers = {
-        row["id"]: _number(target, Instrument, row, ("maker", "model", "serial"))
+        row["id"]: _number(target, StoredInstrument, row, ("maker", "model", "serial"))
         for row in theirs["instrument"]
     }
     references = {
-        row["id"]: _number(target, Reference, row, ("name", "serial", "certificate", "valid_until"))
+        row["id"]: _number(target, StoredReference, row, ("name", "serial", "certificate", "valid_until"))
         for row in theirs["reference"]
     }
-    files = set(target.execute(select(Recording.sha256)).scalars())
-    _insert(target, Recording, [row for row in theirs["recording"] if row["sha256"] not in files])
-    there = set(target.execute(select(Result.id)).scalars())
+    files = set(target.execute(select(StoredFile.sha256)).scalars())
+    _insert(target, StoredFile, [row for row in theirs["recording"] if row["sha256"] not in files])
+    there = set(target.execute(select(StoredResult.id)).scalars())
     new = [row for row in theirs["result"] if row["id"] not in there]
-    _insert(target, Result, [{**row, "instrument_id": numbers.get(row["instrument_id"])} for row in new])
+    _insert(
+        target, StoredResult, [{**row, "instrument_id": numbers.get(row["instrument_id"])} for row in new]
+    )
     names = {row["id"] for row in new}
-    for table in (SourceOf, Coefficient):
+    for table in (SourceOf, StoredCoefficient):
         _insert(target, table, [row for row in theirs[table.__tablename__] if row["result_id"] in names])
     used = [{**row, "reference_id": references[row["reference_id"]]} for row in theirs["used"]]
     _insert(target, Used, [row for row in used if row["result_id"] in names])
@@ -155,26 +157,29 @@ def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: s
     _insert(target, Supersession, later)
     for row in later:
         happened_there("supersede", row["result_id"])
-    issued = set(target.execute(select(Certificate.number)).scalars())
+    issued = set(target.execute(select(IssuedCertificate.number)).scalars())
     certificates = [row for row in theirs["certificate"] if row["number"] not in issued]
     certificates.sort(key=lambda row: row["issued"])
-    _insert(target, Certificate, certificates)
+    _insert(target, IssuedCertificate, certificates)
     fresh = {row["number"] for row in certificates}
     _insert(target, Certified, [row for row in theirs["certified"] if row["number"] in fresh])
     for row in certificates:
         happened_there("certificate", row["number"])
     happened(target, "import", head, digest_of([len(new), len(later), len(certificates)]))
-    return Added(len(new), len(later), len(certificates), len(theirs["result"]) - len(new))
+    return Imported(len(new), len(later), len(certificates), len(theirs["result"]) - len(new))
 
 
-def _insert(connection: Connection, table: type[Base], rows: list[dict[str, Any]]) -> None:
+def _insert(connection: Connection, table: type[Tables], rows: list[dict[str, Any]]) -> None:
     """Insert rows into a table."""
     if rows:
         connection.execute(insert(table), rows)
 
 
 def _number(
-    connection: Connection, table: type[Instrument | Reference], row: dict[str, Any], keys: tuple[str, ...]
+    connection: Connection,
+    table: type[StoredInstrument | StoredReference],
+    row: dict[str, Any],
+    keys: tuple[str, ...],
 ) -> int:
     """The primary key in this store of a row of another store; a new row is added."""
     columns = table.__table__.columns

@@ -16,14 +16,14 @@ from inercal.laboratory.database import reading
 from inercal.laboratory.keep import Item
 from inercal.laboratory.store import Store
 from inercal.laboratory.tables import (
-    Certificate,
     Certified,
-    Coefficient,
-    Instrument,
-    Recording,
-    Reference,
-    Result,
+    IssuedCertificate,
     SourceOf,
+    StoredCoefficient,
+    StoredFile,
+    StoredInstrument,
+    StoredReference,
+    StoredResult,
     Supersession,
     Used,
 )
@@ -54,7 +54,7 @@ class Listed:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownResult:
     """A result whole: its row, estimate, files with their places, reason where it is superseded, certificates."""
 
     listed: Listed
@@ -70,12 +70,12 @@ class Shown:
 
 def instruments(store: Store) -> list[dict[str, Any]]:
     """All instruments, with the number of their results and the date of the last."""
-    last = func.max(Result.made)
+    last = func.max(StoredResult.made)
     query = (
-        select(Instrument, func.count(Result.id).label("results"), last.label("last"))
-        .outerjoin(Result, Result.instrument_id == Instrument.id)
-        .group_by(Instrument.id)
-        .order_by(Instrument.maker, Instrument.model, Instrument.serial)
+        select(StoredInstrument, func.count(StoredResult.id).label("results"), last.label("last"))
+        .outerjoin(StoredResult, StoredResult.instrument_id == StoredInstrument.id)
+        .group_by(StoredInstrument.id)
+        .order_by(StoredInstrument.maker, StoredInstrument.model, StoredInstrument.serial)
     )
     with reading(store.engine, store.where) as connection:
         return [dict(row) for row in connection.execute(query).mappings()]
@@ -105,9 +105,9 @@ def results(
     """
     query = _listed()
     if instrument is not None:
-        query = query.where(Result.instrument_id.in_(numbers_of(store, instrument)))
+        query = query.where(StoredResult.instrument_id.in_(numbers_of(store, instrument)))
     if status is not None:
-        query = query.where(Result.status == status)
+        query = query.where(StoredResult.status == status)
     with reading(store.engine, store.where) as connection:
         found = [_row(row, store.where) for row in connection.execute(query).mappings()]
     found = [each for each in found if since is None or each.date >= since]
@@ -118,23 +118,23 @@ def _listed() -> Any:
     """The query of all results."""
     return (
         select(
-            Result.id,
-            Result.command,
-            Result.status,
-            Result.message,
-            Result.made,
-            Result.measured,
-            Result.operator,
-            Result.version,
-            Instrument.maker,
-            Instrument.model,
-            Instrument.serial,
-            Instrument.owner,
-            Instrument.kind,
+            StoredResult.id,
+            StoredResult.command,
+            StoredResult.status,
+            StoredResult.message,
+            StoredResult.made,
+            StoredResult.measured,
+            StoredResult.operator,
+            StoredResult.version,
+            StoredInstrument.maker,
+            StoredInstrument.model,
+            StoredInstrument.serial,
+            StoredInstrument.owner,
+            StoredInstrument.kind,
             Supersession.by_id,
         )
-        .outerjoin(Instrument, Instrument.id == Result.instrument_id)
-        .outerjoin(Supersession, Supersession.result_id == Result.id)
+        .outerjoin(StoredInstrument, StoredInstrument.id == StoredResult.instrument_id)
+        .outerjoin(Supersession, Supersession.result_id == StoredResult.id)
     )
 
 
@@ -160,7 +160,9 @@ def numbers_of(store: Store, name: str) -> list[int]:
     Raises `InputError` where there is none, or several share the serial number.
     """
     words = name.replace(",", " ").split()
-    query = select(Instrument.id, Instrument.maker, Instrument.model, Instrument.serial)
+    query = select(
+        StoredInstrument.id, StoredInstrument.maker, StoredInstrument.model, StoredInstrument.serial
+    )
     with reading(store.engine, store.where) as connection:
         rows = connection.execute(query).all()
     named = {
@@ -184,7 +186,11 @@ def numbers_of(store: Store, name: str) -> list[int]:
 def find(store: Store, identity: str) -> str:
     """The whole identity of a result of which the beginning is given; raises `InputError` where none or several are."""
     with reading(store.engine, store.where) as connection:
-        query = select(Result.id).where(Result.id.startswith(identity.lower(), autoescape=True)).limit(3)
+        query = (
+            select(StoredResult.id)
+            .where(StoredResult.id.startswith(identity.lower(), autoescape=True))
+            .limit(3)
+        )
         found: Sequence[str] = connection.execute(query).scalars().all()
     if len(found) == 1 and len(identity) >= 4:
         return found[0]
@@ -194,23 +200,23 @@ def find(store: Store, identity: str) -> str:
     raise InputError(identity, f"{what}, expected the identity of one, as `inercal results` lists them")
 
 
-def show(store: Store, identity: str) -> Shown:
+def show(store: Store, identity: str) -> ShownResult:
     """A result whole; raises `InputError` where there is none, or its object is missing or was changed."""
     identity = find(store, identity)
     with reading(store.engine, store.where) as connection:
         listed = _row(
-            connection.execute(_listed().where(Result.id == identity)).mappings().one(), store.where
+            connection.execute(_listed().where(StoredResult.id == identity)).mappings().one(), store.where
         )
-        row = connection.execute(select(Result).where(Result.id == identity)).mappings().one()
+        row = connection.execute(select(StoredResult).where(StoredResult.id == identity)).mappings().one()
         files = connection.execute(
-            select(SourceOf.path, SourceOf.sha256, Recording.place)
-            .join(Recording, Recording.sha256 == SourceOf.sha256)
+            select(SourceOf.path, SourceOf.sha256, StoredFile.place)
+            .join(StoredFile, StoredFile.sha256 == SourceOf.sha256)
             .where(SourceOf.result_id == identity)
             .order_by(SourceOf.position)
         ).all()
         references = connection.execute(
-            select(Reference.name, Reference.serial, Reference.certificate)
-            .join(Used, Used.reference_id == Reference.id)
+            select(StoredReference.name, StoredReference.serial, StoredReference.certificate)
+            .join(Used, Used.reference_id == StoredReference.id)
             .where(Used.result_id == identity)
         ).all()
         reason = connection.execute(
@@ -220,7 +226,7 @@ def show(store: Store, identity: str) -> Shown:
             select(Certified.number).where(Certified.result_id == identity).order_by(Certified.number)
         ).scalars()
         numbers = tuple(certificates)
-    return Shown(
+    return ShownResult(
         listed,
         estimate_in(store, row["object"]),
         row["object"],
@@ -238,11 +244,13 @@ def certificates(store: Store, instrument: str | None = None) -> list[dict[str, 
 
     Of each its number, when it was issued, the number that it supersedes, and the objects of its XML and page.
     """
-    query = select(Certificate.__table__).order_by(Certificate.issued, Certificate.number)
+    query = select(IssuedCertificate.__table__).order_by(IssuedCertificate.issued, IssuedCertificate.number)
     if instrument is not None:
-        of = select(Certified.number).join(Result, Result.id == Certified.result_id)
+        of = select(Certified.number).join(StoredResult, StoredResult.id == Certified.result_id)
         query = query.where(
-            Certificate.number.in_(of.where(Result.instrument_id.in_(numbers_of(store, instrument))))
+            IssuedCertificate.number.in_(
+                of.where(StoredResult.instrument_id.in_(numbers_of(store, instrument)))
+            )
         )
     with reading(store.engine, store.where) as connection:
         return [dict(row) for row in connection.execute(query).mappings()]
@@ -257,24 +265,24 @@ def values_of(store: Store, instrument: str) -> list[dict[str, Any]]:
     """All coefficients of an instrument's results that nothing supersedes, a row each, in the order of dates."""
     query = (
         select(
-            Result.id,
-            Result.command,
-            Result.status,
-            Result.made,
-            Result.measured,
-            Coefficient.position,
-            Coefficient.name,
-            Coefficient.value,
-            Coefficient.u,
-            Coefficient.expanded,
-            Coefficient.k,
-            Coefficient.dof,
-            Coefficient.unit,
-            Coefficient.common,
+            StoredResult.id,
+            StoredResult.command,
+            StoredResult.status,
+            StoredResult.made,
+            StoredResult.measured,
+            StoredCoefficient.position,
+            StoredCoefficient.name,
+            StoredCoefficient.value,
+            StoredCoefficient.u,
+            StoredCoefficient.expanded,
+            StoredCoefficient.k,
+            StoredCoefficient.dof,
+            StoredCoefficient.unit,
+            StoredCoefficient.common,
         )
-        .join(Coefficient, Coefficient.result_id == Result.id)
-        .outerjoin(Supersession, Supersession.result_id == Result.id)
-        .where(Result.instrument_id.in_(numbers_of(store, instrument)), Supersession.by_id.is_(None))
+        .join(StoredCoefficient, StoredCoefficient.result_id == StoredResult.id)
+        .outerjoin(Supersession, Supersession.result_id == StoredResult.id)
+        .where(StoredResult.instrument_id.in_(numbers_of(store, instrument)), Supersession.by_id.is_(None))
     )
     with reading(store.engine, store.where) as connection:
         rows = [dict(row) for row in connection.execute(query).mappings()]

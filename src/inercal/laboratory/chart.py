@@ -22,7 +22,7 @@ from scipy.special import ndtr, ndtri
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.variances import solved, weighed
-from inercal.laboratory.wander import Series, prior_of
+from inercal.laboratory.wander import CalibrationSeries, prior_of
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -64,7 +64,7 @@ class Chart:
         return np.abs(self.ewma) > self.ewma_limit
 
 
-def chart(series: Series) -> Chart:
+def chart(series: CalibrationSeries) -> Chart:
     """The control charts of a coefficient that should not change."""
     n = len(series.y)
     centre, low, high, z = (np.full(n, np.nan) for _ in range(4))
@@ -87,7 +87,7 @@ def chart(series: Series) -> Chart:
     return Chart(centre, low, high, z, ewma, limit)
 
 
-def _expected(series: Series, k: int) -> tuple[Array, Array, Array]:
+def _expected(series: CalibrationSeries, k: int) -> tuple[Array, Array, Array]:
     """Distribution of calibration k by those before it: weights, means and sigmas of a mixture over s.
 
     The common part of u is the same in all, and cancels.

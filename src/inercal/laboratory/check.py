@@ -12,18 +12,18 @@ from sqlalchemy import Connection, select, text
 from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT
 from inercal.laboratory.database import reading
-from inercal.laboratory.keep import Rows, id_of
+from inercal.laboratory.keep import StoredRows, id_of
 from inercal.laboratory.store import BEGIN, Store, digest_of, hash_of, scrubbed, told
 from inercal.laboratory.tables import (
-    Certificate,
     Certified,
-    Coefficient,
     Event,
-    Instrument,
-    Recording,
-    Reference,
-    Result,
+    IssuedCertificate,
     SourceOf,
+    StoredCoefficient,
+    StoredFile,
+    StoredInstrument,
+    StoredReference,
+    StoredResult,
     Supersession,
     Used,
 )
@@ -54,10 +54,10 @@ def check(store: Store, progress: Callable[[int, int], None] | None = None) -> C
         results = _results(connection)
         for kind, digests in digests_of(connection).items():
             faults += _told(kind, digests, events)
-        recordings = connection.execute(select(Recording)).mappings().all()
+        recordings = connection.execute(select(StoredFile)).mappings().all()
         pages = [
             sha256
-            for row in connection.execute(select(Certificate.object, Certificate.page))
+            for row in connection.execute(select(IssuedCertificate.object, IssuedCertificate.page))
             for sha256 in row
             if sha256 is not None
         ]
@@ -116,31 +116,37 @@ def digests_of(connection: Connection) -> dict[str, dict[str, str]]:
     }
 
 
-def _results(connection: Connection) -> dict[str, Rows]:
+def _results(connection: Connection) -> dict[str, StoredRows]:
     """The rows of all results."""
     names = {
         row["id"]: (row["maker"], row["model"], row["serial"])
-        for row in connection.execute(select(Instrument)).mappings()
+        for row in connection.execute(select(StoredInstrument)).mappings()
     }
     sources: dict[str, list[tuple[str, str]]] = {}
     for row in connection.execute(select(SourceOf).order_by(SourceOf.position)).mappings():
         sources.setdefault(row["result_id"], []).append((row["sha256"], row["path"]))
     coefficients: dict[str, list[dict[str, Any]]] = {}
-    for row in connection.execute(select(Coefficient).order_by(Coefficient.position)).mappings():
+    for row in connection.execute(select(StoredCoefficient).order_by(StoredCoefficient.position)).mappings():
         own = {key: value for key, value in row.items() if key not in ("result_id", "position")}
         coefficients.setdefault(row["result_id"], []).append(own)
     used: dict[str, list[dict[str, str]]] = {}
     query = select(
-        Used.result_id, Reference.name, Reference.serial, Reference.certificate, Reference.valid_until
+        Used.result_id,
+        StoredReference.name,
+        StoredReference.serial,
+        StoredReference.certificate,
+        StoredReference.valid_until,
     )
-    for row in connection.execute(query.join(Reference, Reference.id == Used.reference_id)).mappings():
+    for row in connection.execute(
+        query.join(StoredReference, StoredReference.id == Used.reference_id)
+    ).mappings():
         used.setdefault(row["result_id"], []).append({k: v for k, v in row.items() if k != "result_id"})
     found = {}
-    for row in connection.execute(select(Result)).mappings():
+    for row in connection.execute(select(StoredResult)).mappings():
         identity = row["id"]
         own = {key: value for key, value in row.items() if key != "instrument_id"}
         instrument = () if row["instrument_id"] is None else names.get(row["instrument_id"], ("",))
-        found[identity] = Rows(
+        found[identity] = StoredRows(
             own,
             instrument,
             tuple(sources.get(identity, ())),
@@ -157,7 +163,7 @@ def _certificates(connection: Connection) -> dict[str, str]:
         stated.setdefault(row["number"], []).append(row["result_id"])
     return {
         row["number"]: digest_of([dict(row), stated.get(row["number"], [])])
-        for row in connection.execute(select(Certificate)).mappings()
+        for row in connection.execute(select(IssuedCertificate)).mappings()
     }
 
 

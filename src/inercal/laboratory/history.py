@@ -17,7 +17,7 @@ from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.results.shown import units_shown
 from inercal.laboratory.chart import Chart, chart
 from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
-from inercal.laboratory.wander import Interval, Series, Wandering, wandering
+from inercal.laboratory.wander import CalibrationSeries, Interval, Wandering, wandering
 
 YEAR = 365.25
 """Days."""
@@ -51,7 +51,7 @@ class Course:
     unit: str
     dates: tuple[date, ...]
     ids: tuple[str, ...]
-    series: Series
+    series: CalibrationSeries
     U: Array
     E_n: Array
     chart: Chart
@@ -171,7 +171,7 @@ def _course(
     common = np.minimum(common, u)
     own, k = np.sqrt(u**2 - common**2), column("k", 2.0)
     t = np.array([(day - begin).days / YEAR for day in dates])
-    series = Series(t, column("value", np.nan) / size, own, common)
+    series = CalibrationSeries(t, column("value", np.nan) / size, own, common)
     apart, U = np.diff(series.y), k * own
     with np.errstate(divide="ignore", invalid="ignore"):
         E_n = np.concatenate([[np.nan], np.abs(apart) / np.hypot(U[1:], U[:-1])])

@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.faces.report.html import Picture
 from inercal.faces.report.html import page as template
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, QUIET
 from inercal.foundation.arrays import Array
@@ -259,7 +259,7 @@ def _values(course: Course, first: float, last: float) -> list[Mark]:
         times = np.linspace(0.0, last - first, _COLUMNS)
         found = [course.wandering.at(float(each)) for each in times]
         middle, U = np.array([each.value for each in found]), np.array([each.U for each in found])
-        marks += [Band(times + first, middle - U, middle + U, "by the model"), Line(times + first, middle)]
+        marks += [Area(times + first, middle - U, middle + U, "by the model"), Line(times + first, middle)]
     for limit, label in ((chart.low, "limits"), (chart.high, "")):
         marks.append(Line(t, limit, label, QUIET, style="--"))
     marks += _points(t, course.series.y, chart.alarms, course.U, "calibration, U")

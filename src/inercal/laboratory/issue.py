@@ -15,7 +15,7 @@ from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT, find
 from inercal.laboratory.database import writing
 from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import Certificate, Certified, Result, Supersession
+from inercal.laboratory.tables import Certified, IssuedCertificate, StoredResult, Supersession
 
 
 def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, str]:
@@ -34,7 +34,7 @@ def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, s
         raise InputError(by, "is the same result, expected the one that takes its place")
     with writing(store.engine, store.where) as connection:
         numbers = {
-            connection.execute(select(Result.instrument_id).where(Result.id == each)).scalar()
+            connection.execute(select(StoredResult.instrument_id).where(StoredResult.id == each)).scalar()
             for each in (old, new)
         }
         if len(numbers) > 1:
@@ -96,7 +96,7 @@ def issuing(
     with writing(store.engine, store.where) as connection:
         numbers = {
             each.number: each.supersedes
-            for each in connection.execute(select(Certificate.number, Certificate.supersedes))
+            for each in connection.execute(select(IssuedCertificate.number, IssuedCertificate.supersedes))
         }
         if number in numbers:
             raise InputError(
@@ -118,7 +118,7 @@ def issuing(
                     identity[:SHORT], f"is superseded by {by[:SHORT]}, expected a result that is not"
                 )
         identities = sorted(set(results))
-        connection.execute(insert(Certificate).values(**row))
+        connection.execute(insert(IssuedCertificate).values(**row))
         connection.execute(insert(Certified), [{"number": number, "result_id": each} for each in identities])
         happened(connection, "certificate", number, digest_of([row, identities]))
         yield

@@ -18,7 +18,15 @@ from inercal.foundation.results.files import plain_objects, to_json
 from inercal.foundation.results.result import Estimate
 from inercal.laboratory.database import reading, writing
 from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import Coefficient, Instrument, Recording, Reference, Result, SourceOf, Used
+from inercal.laboratory.tables import (
+    SourceOf,
+    StoredCoefficient,
+    StoredFile,
+    StoredInstrument,
+    StoredReference,
+    StoredResult,
+    Used,
+)
 
 LARGE = 1 << 30
 """Bytes beyond which a file is kept by reference: its path and SHA-256."""
@@ -40,7 +48,7 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptResult:
     """A result in a store: its ``id``, ``new`` unless it was there, and ``notes`` on what could not be kept whole."""
 
     id: str
@@ -87,7 +95,7 @@ def keep(
     report: bytes | None = None,
     saved: Mapping[str, Any] | None = None,
     copies: Mapping[str, Path] | None = None,
-) -> Kept:
+) -> KeptResult:
     """Keep a result with the files it rests on.
 
     Parameters
@@ -132,7 +140,7 @@ def keep(
         "status": data["status"]["code"],
         "message": data["status"]["message"],
     }
-    rows = Rows(
+    rows = StoredRows(
         result,
         () if item is None else (item.maker, item.model, item.serial),
         tuple((source["sha256"], source["path"]) for source in data["inputs"]),
@@ -140,15 +148,15 @@ def keep(
         references_of(data),
     )
     with writing(store.engine, store.where) as connection:
-        if connection.execute(select(Result.id).where(Result.id == identity)).first():
-            return Kept(identity, False)
+        if connection.execute(select(StoredResult.id).where(StoredResult.id == identity)).first():
+            return KeptResult(identity, False)
         number = None if item is None else _instrument(connection, item)
         for file in files:
-            if not connection.execute(select(Recording).where(Recording.sha256 == file["sha256"])).first():
-                connection.execute(insert(Recording).values(**file))
+            if not connection.execute(select(StoredFile).where(StoredFile.sha256 == file["sha256"])).first():
+                connection.execute(insert(StoredFile).values(**file))
         add_rows(connection, rows, number)
         happened(connection, "keep", identity, rows.digest)
-    return Kept(identity, True, tuple(notes))
+    return KeptResult(identity, True, tuple(notes))
 
 
 def kept_already(store: Store, estimate: Estimate, saved: Mapping[str, Any]) -> str | None:
@@ -156,12 +164,14 @@ def kept_already(store: Store, estimate: Estimate, saved: Mapping[str, Any]) -> 
     identity = id_of(to_json(estimate) | plain_objects(saved))
     with reading(store.engine, store.where) as connection:
         return (
-            identity if connection.execute(select(Result.id).where(Result.id == identity)).first() else None
+            identity
+            if connection.execute(select(StoredResult.id).where(StoredResult.id == identity)).first()
+            else None
         )
 
 
 @dataclass(frozen=True)
-class Rows:
+class StoredRows:
     """The rows of a result: its own without the instrument's number, instrument, files, coefficients, references."""
 
     result: Mapping[str, Any]
@@ -221,9 +231,9 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def add_rows(connection: Connection, rows: Rows, instrument_id: int | None) -> None:
+def add_rows(connection: Connection, rows: StoredRows, instrument_id: int | None) -> None:
     """Add the rows of a result, in a transaction that writes."""
-    connection.execute(insert(Result).values(**rows.result, instrument_id=instrument_id))
+    connection.execute(insert(StoredResult).values(**rows.result, instrument_id=instrument_id))
     identity = rows.result["id"]
     sources = [
         {"result_id": identity, "position": i, "sha256": sha256, "path": path}
@@ -232,28 +242,36 @@ def add_rows(connection: Connection, rows: Rows, instrument_id: int | None) -> N
     coefficients = [{"result_id": identity, "position": i, **row} for i, row in enumerate(rows.coefficients)]
     numbers = dict.fromkeys(_reference(connection, row) for row in rows.references)
     used = [{"result_id": identity, "reference_id": number} for number in numbers]
-    for table, values in ((SourceOf, sources), (Coefficient, coefficients), (Used, used)):
+    for table, values in ((SourceOf, sources), (StoredCoefficient, coefficients), (Used, used)):
         if values:
             connection.execute(insert(table), values)
 
 
 def _instrument(connection: Connection, item: Item) -> int:
     """The primary key of an instrument; a new instrument is added."""
-    same = (Instrument.maker == item.maker, Instrument.model == item.model, Instrument.serial == item.serial)
-    number = connection.execute(select(Instrument.id).where(*same)).scalar()
+    same = (
+        StoredInstrument.maker == item.maker,
+        StoredInstrument.model == item.model,
+        StoredInstrument.serial == item.serial,
+    )
+    number = connection.execute(select(StoredInstrument.id).where(*same)).scalar()
     if number is None:
         values = {"kind": item.kind, "owner": item.owner, "notes": ""}
         row = {"maker": item.maker, "model": item.model, "serial": item.serial, **values}
-        number = connection.execute(insert(Instrument).values(**row).returning(Instrument.id)).scalar_one()
+        number = connection.execute(
+            insert(StoredInstrument).values(**row).returning(StoredInstrument.id)
+        ).scalar_one()
     return number
 
 
 def _reference(connection: Connection, row: Mapping[str, str]) -> int:
     """The primary key of a reference; a new reference is added."""
-    same = (getattr(Reference, key) == row[key] for key in row)
-    number = connection.execute(select(Reference.id).where(*same)).scalar()
+    same = (getattr(StoredReference, key) == row[key] for key in row)
+    number = connection.execute(select(StoredReference.id).where(*same)).scalar()
     if number is None:
-        number = connection.execute(insert(Reference).values(**row).returning(Reference.id)).scalar_one()
+        number = connection.execute(
+            insert(StoredReference).values(**row).returning(StoredReference.id)
+        ).scalar_one()
     return number
 
 

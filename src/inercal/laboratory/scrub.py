@@ -23,7 +23,16 @@ from inercal.laboratory.database import vacuum, writing
 from inercal.laboratory.migrations.append_only import suspended
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
-from inercal.laboratory.tables import Base, Certificate, Event, Recording, Reference, Result, Setting, Used
+from inercal.laboratory.tables import (
+    Event,
+    IssuedCertificate,
+    Setting,
+    StoredFile,
+    StoredReference,
+    StoredResult,
+    Tables,
+    Used,
+)
 
 _APPEND_ONLY = (
     "recording",
@@ -117,10 +126,10 @@ _ELSEWHERE = (
 def _replaced(connection: Connection, objects: Objects) -> Iterator[tuple[str, str]]:
     """Write objects with a secret anew, and let rows point to the new ones: old and new SHA-256."""
     for table, column, cleaned in (
-        (Result, "object", _result),
-        (Result, "report", _page),
-        (Certificate, "object", _certificate),
-        (Certificate, "page", _page),
+        (StoredResult, "object", _result),
+        (StoredResult, "report", _page),
+        (IssuedCertificate, "object", _certificate),
+        (IssuedCertificate, "page", _page),
     ):
         own = table.__table__.columns[column]
         for sha256 in set(connection.execute(select(own).where(own.is_not(None))).scalars()):
@@ -175,7 +184,7 @@ def _certificate(content: bytes) -> bytes:
 def _clean_rows(connection: Connection) -> int:
     """Write the texts in rows without secrets; how many there were."""
     count = 0
-    for table in Base.metadata.sorted_tables:
+    for table in Tables.metadata.sorted_tables:
         key = table.primary_key.columns.values()
         columns = [
             column
@@ -207,7 +216,7 @@ def _joined(connection: Connection, table: Table, row: Mapping[str, Any]) -> boo
     there = connection.execute(select(table.c.id).where(*same, table.c.id != row["id"])).scalar()
     if there is None:
         return False
-    if table.name == Reference.__tablename__:  # a result that used both has it once
+    if table.name == StoredReference.__tablename__:  # a result that used both has it once
         twice = select(Used.result_id).where(Used.reference_id == there)
         connection.execute(delete(Used).where(Used.reference_id == row["id"], Used.result_id.in_(twice)))
     connection.execute(update(pointer.table).where(pointer == row["id"]).values({pointer.name: there}))
@@ -216,7 +225,7 @@ def _joined(connection: Connection, table: Table, row: Mapping[str, Any]) -> boo
 
 
 _POINTERS: Mapping[str, tuple[Any, tuple[str, ...]]] = {
-    "instrument": (Result.__table__.c.instrument_id, ("maker", "model", "serial")),
+    "instrument": (StoredResult.__table__.c.instrument_id, ("maker", "model", "serial")),
     "reference": (Used.__table__.c.reference_id, ("name", "serial", "certificate", "valid_until")),
 }
 """The column that points to rows of a table, and the columns by which these are told apart."""
@@ -245,10 +254,15 @@ def _others(connection: Connection, objects: Objects) -> tuple[list[str], list[s
     short, and small files that results rest on."""
     pointed = {
         sha256
-        for column in (Result.object, Result.report, Certificate.object, Certificate.page)
+        for column in (
+            StoredResult.object,
+            StoredResult.report,
+            IssuedCertificate.object,
+            IssuedCertificate.page,
+        )
         for sha256 in connection.execute(select(column)).scalars()
     }
-    query = select(Recording.sha256, Recording.bytes).where(Recording.place.is_(None))
+    query = select(StoredFile.sha256, StoredFile.bytes).where(StoredFile.place.is_(None))
     sizes = {row.sha256: row.bytes for row in connection.execute(query)}
     loose: list[str] = []
     files: list[str] = []

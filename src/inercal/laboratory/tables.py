@@ -16,13 +16,13 @@ Words = Annotated[str, mapped_column(Text)]
 MaybeWords = Annotated[str | None, mapped_column(Text)]
 
 
-class Base(DeclarativeBase):
+class Tables(DeclarativeBase):
     """The tables."""
 
     __table_args__: object = {"sqlite_strict": True}
 
 
-class Setting(Base):
+class Setting(Tables):
     """A setting of the store itself: ``objects``, where they are."""
 
     __tablename__ = "setting"
@@ -30,7 +30,7 @@ class Setting(Base):
     value: Mapped[Words]
 
 
-class Instrument(Base):
+class StoredInstrument(Tables):
     """An instrument that is calibrated."""
 
     __tablename__ = "instrument"
@@ -44,7 +44,7 @@ class Instrument(Base):
     notes: Mapped[Words]
 
 
-class Reference(Base):
+class StoredReference(Tables):
     """A standard, table or rig that a calibration used: its certificate, and until when that is valid."""
 
     __tablename__ = "reference"
@@ -59,7 +59,7 @@ class Reference(Base):
     valid_until: Mapped[Words]
 
 
-class Recording(Base):
+class StoredFile(Tables):
     """A file that results rest on, a recording, map or study: ``place`` is its path where it is kept by reference."""
 
     __tablename__ = "recording"
@@ -68,7 +68,7 @@ class Recording(Base):
     place: Mapped[MaybeWords]
 
 
-class Result(Base):
+class StoredResult(Tables):
     """A result: ``id`` is the SHA-256 of what it says, times of computing and the command line apart.
 
     ``object`` is its JSON, ``report`` its page; ``program`` the SHA-256 of the sources that made it, where known.
@@ -89,7 +89,7 @@ class Result(Base):
     message: Mapped[Words]
 
 
-class SourceOf(Base):
+class SourceOf(Tables):
     """A file that a result rests on, under the path by which the command knew it."""
 
     __tablename__ = "source"
@@ -99,7 +99,7 @@ class SourceOf(Base):
     path: Mapped[Words]
 
 
-class Used(Base):
+class Used(Tables):
     """A reference that a result used."""
 
     __tablename__ = "used"
@@ -107,7 +107,7 @@ class Used(Base):
     reference_id: Mapped[int] = mapped_column(ForeignKey("reference.id"), primary_key=True)
 
 
-class Coefficient(Base):
+class StoredCoefficient(Tables):
     """A coefficient of a result: value, standard and expanded uncertainty, coverage factor; ``dof`` None is infinite.
 
     ``common`` is the part of u that repeat runs have in common, where the result tells it apart.
@@ -126,7 +126,7 @@ class Coefficient(Base):
     common: Mapped[MaybeNumber]
 
 
-class Supersession(Base):
+class Supersession(Tables):
     """A result that another takes the place of, and why."""
 
     __tablename__ = "supersession"
@@ -136,7 +136,7 @@ class Supersession(Base):
     made: Mapped[Words]
 
 
-class Event(Base):
+class Event(Tables):
     """Something that was done to the store, in order; ``hash`` covers the row and the hash of the row before."""
 
     __tablename__ = "event"
@@ -149,7 +149,7 @@ class Event(Base):
     hash: Mapped[Words]
 
 
-class Certificate(Base):
+class IssuedCertificate(Tables):
     """A certificate that was issued: its XML, its page, and the number of the one that it supersedes."""
 
     __tablename__ = "certificate"
@@ -160,7 +160,7 @@ class Certificate(Base):
     supersedes: Mapped[str | None] = mapped_column(Text, ForeignKey("certificate.number"))
 
 
-class Certified(Base):
+class Certified(Tables):
     """A result that a certificate states."""
 
     __tablename__ = "certified"

@@ -45,7 +45,7 @@ _NEGLIGIBLE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class CalibrationSeries:
     """Calibrations of a coefficient in the order of time.
 
     ``t`` (n,) in years, ``y`` (n,) values, ``own`` (n,) standard uncertainty that is each calibration's own, ``common``
@@ -86,7 +86,7 @@ class Wandering:
     that of the covariance of the values.
     """
 
-    series: Series
+    series: CalibrationSeries
     weights: Array
     walk: Array
     noise: Array
@@ -123,7 +123,7 @@ class Wandering:
         return middle, low, high
 
 
-def wandering(series: Series) -> Wandering:
+def wandering(series: CalibrationSeries) -> Wandering:
     """The wandering of a coefficient from three or more calibrations at two or more times.
 
     Raises `ValueError` for fewer.
@@ -158,7 +158,7 @@ def wandering(series: Series) -> Wandering:
     )
 
 
-def _regressors(series: Series) -> Array:
+def _regressors(series: CalibrationSeries) -> Array:
     """Derivatives (n, 2) by a, at the mean time, and b."""
     return np.column_stack([np.ones(len(series.t)), series.t - series.t.mean()])
 

@@ -29,7 +29,7 @@ Channels = Collection[str]
 
 
 @dataclass(frozen=True)
-class Design:
+class OfferedDesign:
     """A design of a test by a study: ``find`` it, and what to ``prepare`` before (kernels that are compiled)."""
 
     find: Callable[[Study], Result]
@@ -37,7 +37,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Plan:
+class OfferedPlan:
     """The plan of a test in lines of text, and in the study: that of one ``design``.
 
     ``ending`` is that of the file of a plan that the design finds, empty where it finds none; a line ``says`` such as.
@@ -106,7 +106,7 @@ class System:
     """True where ``calibrate`` compares estimators."""
     simulate: Callable[[Study, np.random.Generator], Record]
     """A recording of the test that a study plans."""
-    designs: Mapping[str, Design] = field(default_factory=dict)
+    designs: Mapping[str, OfferedDesign] = field(default_factory=dict)
     """Designs by their name, the first that of a study that names none."""
     sensitivity: Callable[[Study], Result] | None = None
     """Errors that matter for what the instrument should read."""
@@ -127,7 +127,7 @@ class System:
     """Uncertainties that the plan of settings makes expect."""
     verticals: Callable[[Any], Array] | None = None
     """Directions (r, 3) of the vertical on the instrument at each stop of the plan."""
-    plan: Plan | None = None
+    plan: OfferedPlan | None = None
     """The plan in lines of text."""
 
     # validation

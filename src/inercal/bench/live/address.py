@@ -38,7 +38,7 @@ LARGEST_SPEED = 1e6
 
 
 @dataclass(frozen=True)
-class Serial:
+class SerialPort:
     """A serial port, 8 bits, no parity, 1 stop bit."""
 
     device: str
@@ -109,7 +109,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class PieceFolder:
     """A folder of files, each of which holds the rows of some seconds."""
 
     folder: Path
@@ -119,8 +119,8 @@ class Pieces:
         return f"{self.form}:{self.folder}"
 
 
-Source = Serial | Udp | Tcp | Mqtt | Replay
-Sink = Text | Pieces | Udp | Mqtt
+Source = SerialPort | Udp | Tcp | Mqtt | Replay
+Sink = Text | PieceFolder | Udp | Mqtt
 
 
 def source_of(text: str) -> Source:
@@ -130,7 +130,7 @@ def source_of(text: str) -> Source:
     match scheme:
         case "serial":
             baud = _number(keys, "baud", text, 1, LARGEST_BAUD, "115200")
-            source = Serial(_named(rest, text, "serial:/dev/ttyUSB0"), int(baud))
+            source = SerialPort(_named(rest, text, "serial:/dev/ttyUSB0"), int(baud))
         case "replay":
             speed = _number(keys, "speed", text, 0.0, LARGEST_SPEED, "1")
             source = Replay(Path(_named(rest, text, "replay:FILE")), speed)
@@ -155,9 +155,9 @@ def sink_of(text: str) -> Sink:
             name = _named(rest, text, "text:FILE")
             sink = Text(None if name == "-" else Path(name))
         case "parquet":
-            sink = Pieces(Path(_named(rest, text, "parquet:FOLDER")), "parquet")
+            sink = PieceFolder(Path(_named(rest, text, "parquet:FOLDER")), "parquet")
         case "hdf5":
-            sink = Pieces(Path(_named(rest, text, "hdf5:FOLDER")), "hdf5")
+            sink = PieceFolder(Path(_named(rest, text, "hdf5:FOLDER")), "hdf5")
         case "udp":
             sink = Udp(*_host_and_port(rest, text, None))
         case "mqtt" | "mqtts":

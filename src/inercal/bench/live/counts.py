@@ -130,7 +130,7 @@ class Stamps:
         self.late += delay - min(self._least) > _LATE
 
 
-class Spread:
+class TimeSpread:
     """Times in bins of an eighth of an octave: their quantiles in memory that does not grow."""
 
     def __init__(self) -> None:

@@ -17,9 +17,9 @@ from typing import IO, TYPE_CHECKING
 
 from inercal.bench.live.intake import Arrival, Intake
 from inercal.foundation.errors import MapError, RecordError
-from inercal.foundation.records.frames import Frame, Turns, frames_in
+from inercal.foundation.records.frames import CounterTurns, Frame, frames_in
 from inercal.foundation.records.places import counted_names, shortened
-from inercal.foundation.records.read.table import FileOptions, Part
+from inercal.foundation.records.read.table import FileOptions, FileShare
 from inercal.foundation.units import shown
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ class Feed:
         self._frame = frame_of(record_map)
         self.record_map = record_map if self._frame is None else _as_text(record_map, self._frame)
         self._stamp = _stamp_field(record_map, self._frame)
-        self._turns = {name: Turns() for name in {self._stamp, self._frame and self._frame.counter} if name}
+        self._turns = {
+            name: CounterTurns() for name in {self._stamp, self._frame and self._frame.counter} if name
+        }
         self._held = bytearray()
         self._lines: deque[bytes] = deque()
         self._header, self._begun, self._cut, self._skipping = b"", False, False, False
@@ -210,7 +212,7 @@ def _as_text(record_map: RecordMap | None, frame: Frame) -> RecordMap | None:
                 f"found no {shown(channel.origin)} in the frame ({held}), expected it there",
             )
         channels.append(replace(channel, origin=origin))
-    as_text = Part(tuple(channels), FileOptions(delimiter=",", decimal=".", comment=""))
+    as_text = FileShare(tuple(channels), FileOptions(delimiter=",", decimal=".", comment=""))
     return replace(record_map, parts=(as_text,))
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NamedTuple
 
-from inercal.bench.live.address import Mqtt, Replay, Serial, Source, Tcp, Udp
+from inercal.bench.live.address import Mqtt, Replay, SerialPort, Source, Tcp, Udp
 from inercal.bench.live.sources import Piece, Wire, open_wire
 from inercal.foundation.errors import InercalError, InputError
 
@@ -177,7 +177,7 @@ class Intake:
 
 def may_begin_within_a_row(source: Source) -> bool:
     """True for a source that may be joined in the middle of a row."""
-    return isinstance(source, Serial | Tcp)
+    return isinstance(source, SerialPort | Tcp)
 
 
 def is_datagrams(source: Source) -> bool:

@@ -20,9 +20,9 @@ from inercal.bench.live.address import Sink, Source, sink_of, source_of
 from inercal.bench.live.counts import Counts, SinkCounts
 from inercal.bench.live.feed import Feed
 from inercal.bench.live.intake import Intake, is_datagrams, may_begin_within_a_row
-from inercal.bench.live.pieces import Row, quantities_of
+from inercal.bench.live.pieces import EstimatorRow, quantities_of
 from inercal.bench.live.sinks import Outlet, new_file
-from inercal.bench.live.watch import Quantity, Watch, Watched
+from inercal.bench.live.watch import Watch, Watched, WatchedValue
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import Output, Saving, run
 from inercal.foundation.errors import InercalError, InputError, RecordError
@@ -49,7 +49,7 @@ class Alarm:
 
 
 @dataclass(frozen=True)
-class Plan:
+class MeasurementPlan:
     """The settings of a measurement.
 
     ``make`` prepares the estimator: it is called with what takes messages and findings, and loads kernels, which may
@@ -64,7 +64,7 @@ class Plan:
     saving: Saving | None = None
 
 
-class Measurement:
+class RunningMeasurement:
     """A source measured in threads of its own, from `start` until it ends, fails or is asked to stop.
 
     Parameters
@@ -80,7 +80,7 @@ class Measurement:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: MeasurementPlan,
         say: Callable[[str], None] = lambda _: None,
         say_finding: Callable[[Finding], None] = lambda _: None,
         print_line: Callable[[str], None] = lambda _: None,
@@ -131,17 +131,17 @@ class Measurement:
         return self._intake.alive
 
     @property
-    def latest(self) -> dict[str, Quantity]:
+    def latest(self) -> dict[str, WatchedValue]:
         """The last row: each quantity of it by name, with u; empty before the first."""
         with self._lock:
             values = self._latest
         return {
-            name: Quantity(each["value"], _number(each.get("u")), str(each["unit"]))
+            name: WatchedValue(each["value"], _number(each.get("u")), str(each["unit"]))
             for name, each in (quantities_of(self.columns, values) if values else {}).items()
         }
 
     @property
-    def channels(self) -> dict[str, Quantity]:
+    def channels(self) -> dict[str, WatchedValue]:
         """The last sample that came, by channel."""
         return self._watch.channels
 
@@ -250,7 +250,7 @@ class Measurement:
         def write(text: str) -> None:
             if next(titles, False):
                 return
-            row = Row(text, estimator.given.popleft(), self._watch.due or feed.arrived)
+            row = EstimatorRow(text, estimator.given.popleft(), self._watch.due or feed.arrived)
             for outlet in self._outlets:
                 outlet.offer(row)
             self._seen(row)
@@ -261,7 +261,7 @@ class Measurement:
 
         return write
 
-    def _seen(self, row: Row) -> None:
+    def _seen(self, row: EstimatorRow) -> None:
         """Keep a row for who looks."""
         with self._lock:
             self._latest = row.values
@@ -305,7 +305,7 @@ def measure(
     record: str | Path | None = None,
     to: Sequence[str] = (),
     every: float = 0.0,
-) -> Measurement:
+) -> RunningMeasurement:
     """Begin to measure a source by a study, in a thread.
 
     Parameters
@@ -326,12 +326,12 @@ def measure(
     Returns
     -------
     Measurement
-        At work: `Measurement.latest`, `Measurement.counts`, `Measurement.stop`.
+        At work: `RunningMeasurement.latest`, `RunningMeasurement.counts`, `RunningMeasurement.stop`.
 
     Raises
     ------
     InputError
-        An address, study or map that is wrong in itself. What fails later is in `Measurement.failure`.
+        An address, study or map that is wrong in itself. What fails later is in `RunningMeasurement.failure`.
     """
     from inercal.faces.python.study import study_of
     from inercal.faces.stream.estimators import of_study
@@ -348,7 +348,9 @@ def measure(
     def make(say: Say, say_finding: SayFinding) -> Make:
         return of_study(of, every, say, say_finding)
 
-    began = Measurement(Plan(wire, make, record_map, None if record is None else Path(record), sinks))
+    began = RunningMeasurement(
+        MeasurementPlan(wire, make, record_map, None if record is None else Path(record), sinks)
+    )
     began.start()
     return began
 

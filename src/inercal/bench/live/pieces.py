@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from inercal.bench.live.address import Pieces
+from inercal.bench.live.address import PieceFolder
 from inercal.foundation._files import replacing
 from inercal.foundation.errors import InputError, MissingExtraError
 from inercal.foundation.records.titles import name_and_unit
 
 
-class Row(NamedTuple):
+class EstimatorRow(NamedTuple):
     """A row of an estimator: its line, its values (NaN and texts as they are), and when its sample came [s]."""
 
     text: str
@@ -67,7 +67,7 @@ class PieceFiles:
     Raises `InputError` where the folder cannot be made, `MissingExtraError` for Parquet without pyarrow.
     """
 
-    def __init__(self, sink: Pieces) -> None:
+    def __init__(self, sink: PieceFolder) -> None:
         self._folder = sink.folder
         self._columns: Sequence[str] = ()
         self._suffix, self._form = (".parquet", _parquet) if sink.form == "parquet" else (".h5", _hdf5)
@@ -98,7 +98,7 @@ class PieceFiles:
         """Take the titles."""
         self._columns = columns
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Hold rows until a piece is full."""
         if rows and not self._rows:
             self._begun = time.monotonic()

@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
-from inercal.bench.live.address import Mqtt, Pieces, Sink, Text, Udp
+from inercal.bench.live.address import Mqtt, PieceFolder, Sink, Text, Udp
 from inercal.bench.live.broker import Broker
-from inercal.bench.live.counts import SinkCounts, Spread
-from inercal.bench.live.pieces import PieceFiles, Row, payload
+from inercal.bench.live.counts import SinkCounts, TimeSpread
+from inercal.bench.live.pieces import EstimatorRow, PieceFiles, payload
 from inercal.foundation.errors import InputError
 
 ROOM = 10_000
@@ -40,7 +40,7 @@ class Writer(Protocol):
     def begin(self, columns: Sequence[str]) -> None:
         """Take the titles of the rows, before the first of them."""
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Take rows, perhaps none, some time after the last call; how many were delivered."""
 
     def settle(self) -> None:
@@ -78,13 +78,13 @@ class Outlet:
             self._writer = _writer(sink, print_line, say)
         except OSError as error:
             raise InputError(sink, f"cannot be opened ({error.strerror or error})") from error
-        self._rows: deque[Row] = deque()
+        self._rows: deque[EstimatorRow] = deque()
         self._change = threading.Condition()
         self._busy, self._closing, self._settled, self._asked_to_settle = False, False, True, False
         self._columns: Sequence[str] = ()
         self._begun = False
         self._written = self._dropped = 0
-        self._times = Spread()
+        self._times = TimeSpread()
         self.failure = ""
         self._thread = threading.Thread(target=self._work, name=f"sink {sink}", daemon=True)
 
@@ -93,7 +93,7 @@ class Outlet:
         self._columns, self._begun = columns, True
         self._thread.start()
 
-    def offer(self, row: Row) -> None:
+    def offer(self, row: EstimatorRow) -> None:
         """Take a row, or drop the row if the queue is full."""
         with self._change:
             if self.failure or len(self._rows) >= ROOM:
@@ -197,7 +197,7 @@ def _writer(sink: Sink, print_line: Callable[[str], None], say: Callable[[str], 
             return _Printed(print_line)
         case Text():
             return _TextFile(sink)
-        case Pieces():
+        case PieceFolder():
             return PieceFiles(sink)
         case Udp():
             return _Datagrams(sink)
@@ -229,7 +229,7 @@ class _Printed(_AtOnce):
         """Print the titles."""
         self._print(",".join(columns))
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Print lines."""
         if rows:
             self._print("\n".join(row.text for row in rows))
@@ -249,7 +249,7 @@ class _TextFile(_AtOnce):
         """Write the titles."""
         os.write(self._file, f"{','.join(columns)}\n".encode())
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Append whole lines to the file."""
         data = "".join(f"{row.text}\n" for row in rows).encode()
         while data:
@@ -292,7 +292,7 @@ class _Datagrams(_AtOnce):
         """Take the titles."""
         self._titles = f"{','.join(columns)}\n".encode()
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Send them; nobody may be listening."""
         if time.monotonic() >= self._due:
             self._due = time.monotonic() + 1.0
@@ -327,7 +327,7 @@ class _Messages(_AtOnce):
         """Take the titles."""
         self._columns = columns
 
-    def write(self, rows: Sequence[Row]) -> int:
+    def write(self, rows: Sequence[EstimatorRow]) -> int:
         """Publish them; those that the broker has not confirmed when it goes are lost, and counted."""
         if self._broker is None and not self._again():
             return 0

@@ -9,7 +9,7 @@ import struct
 import sys
 from typing import Any, NamedTuple, Protocol
 
-from inercal.bench.live.address import Mqtt, Replay, Serial, Source, Tcp, Udp
+from inercal.bench.live.address import Mqtt, Replay, SerialPort, Source, Tcp, Udp
 from inercal.bench.live.broker import Broker
 from inercal.foundation._files import is_pipe
 from inercal.foundation.errors import MissingExtraError, RecordError
@@ -48,7 +48,7 @@ class Wire(Protocol):
 def open_wire(source: Source) -> Wire:
     """Open a source; raises `OSError` where it cannot be, `InputError` where trying again would be of no use."""
     match source:
-        case Serial():
+        case SerialPort():
             return _Serial(source)
         case Udp():
             return _Udp(source)
@@ -63,7 +63,7 @@ def open_wire(source: Source) -> Wire:
 class _Serial:
     """A serial port."""
 
-    def __init__(self, at: Serial) -> None:
+    def __init__(self, at: SerialPort) -> None:
         try:
             import serial
         except ImportError as error:

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from inercal.bench.live.address import Replay, Source
-from inercal.bench.live.counts import Spread, Stamps
+from inercal.bench.live.counts import Stamps, TimeSpread
 from inercal.bench.live.feed import Feed
 from inercal.faces.stream.lines import Lines, Sample
 from inercal.faces.stream.run import Output, Recursive
 
 
 @dataclass(frozen=True)
-class Quantity:
+class WatchedValue:
     """A value, its standard uncertainty where it has one, and the unit of both; None for what is not known."""
 
     value: float | str | None
@@ -30,7 +30,7 @@ class Watch:
     """Samples seen on their way: channels, stamps, times; those of a recording wait until they are due."""
 
     def __init__(self, stop: threading.Event, source: Source) -> None:
-        self.stamps, self.times, self.rows = Stamps(), Spread(), 0
+        self.stamps, self.times, self.rows = Stamps(), TimeSpread(), 0
         self.due = 0.0
         self._replayed = isinstance(source, Replay)
         self._speed = source.speed if isinstance(source, Replay) else 0.0
@@ -43,14 +43,14 @@ class Watch:
         self._titles = [(name, column.unit.symbol) for name, column in lines.record.columns.items()]
 
     @property
-    def channels(self) -> dict[str, Quantity]:
+    def channels(self) -> dict[str, WatchedValue]:
         """The last sample, by channel."""
         sample = self._sample
         if sample is None:
             return {}
         pairs = [(("t", "s"), sample.t), *zip(self._titles, sample.values, strict=True)]
         return {
-            name: Quantity(value if math.isfinite(value) else None, None, unit)
+            name: WatchedValue(value if math.isfinite(value) else None, None, unit)
             for (name, unit), value in pairs
         }
 

@@ -25,7 +25,7 @@ from inercal.laboratory.store import VARIABLE
 from inercal.systems.listed import SYSTEMS
 
 if TYPE_CHECKING:
-    from inercal.bench.workbench.charts import Course, Notes
+    from inercal.bench.workbench.charts import ChannelCourse, Notes
     from inercal.faces.python.result import Result
     from inercal.faces.python.study import Study
     from inercal.foundation.arrays import Array
@@ -49,7 +49,7 @@ class Looked:
 
     files: str
     record: Record
-    courses: tuple[Course, ...]
+    courses: tuple[ChannelCourse, ...]
     notes: Notes
 
 

@@ -31,7 +31,7 @@ _MARKED, _SHADED = 60, 300
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ChannelCourse:
     """A channel: name, unit, times and values (n,); ``low`` and ``high`` of each block of `BLOCK` samples.
 
     ``rising`` says whether the times do; where they don't, rows are counted in their place.
@@ -51,7 +51,7 @@ class Course:
         return sensor_and_axis(self.name)[0]
 
 
-def courses(record: Record) -> tuple[Course, ...]:
+def courses(record: Record) -> tuple[ChannelCourse, ...]:
     """The channels of a record; times that do not rise are counted."""
     rising: dict[int, bool] = {}
     found = []
@@ -63,7 +63,9 @@ def courses(record: Record) -> tuple[Course, ...]:
         values = np.asarray(column.values, dtype=float)
         low, high = _blocks(values)
         found.append(
-            Course(column.name, plain_unit(column.unit.symbol), column.t, values, low, high, rising[key])
+            ChannelCourse(
+                column.name, plain_unit(column.unit.symbol), column.t, values, low, high, rising[key]
+            )
         )
     return tuple(found)
 
@@ -77,7 +79,7 @@ def _blocks(values: Array) -> tuple[Array, Array]:
         return np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
 
 
-def line(course: Course, begin: float | None = None, end: float | None = None) -> tuple[Array, Array]:
+def line(course: ChannelCourse, begin: float | None = None, end: float | None = None) -> tuple[Array, Array]:
     """Points (m,) of a channel between two times [s]: all samples, or the least and greatest value of each piece.
 
     A sample more on each side leads the line out of the picture.
@@ -136,7 +138,7 @@ def marks_of(record: Record) -> dict[float, str]:
 
 
 def figure(
-    shown: Sequence[Course], span: tuple[float, float] | None = None, notes: Notes | None = None
+    shown: Sequence[ChannelCourse], span: tuple[float, float] | None = None, notes: Notes | None = None
 ) -> dict[str, Any]:
     """A figure of plotly with a panel for each sensor, one time axis with one cursor, and ``notes`` at their times."""
     across = Axis("time [s]" if all(course.rising for course in shown) else "row", limits=span)

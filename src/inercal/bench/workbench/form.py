@@ -19,7 +19,7 @@ _DEEPEST = 3
 
 
 @dataclass(frozen=True)
-class Key:
+class FormKey:
     """A key of a study: the table it is in, its name and what it means; how it is typed, with choices and an example.
 
     ``value`` is what the study says, in TOML, or as a text where that is the widget; empty where the key is absent.
@@ -40,15 +40,15 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Table:
+class FormTable:
     """A table of a study with its keys, and what it is about."""
 
     name: str
     says: str
-    keys: tuple[Key, ...]
+    keys: tuple[FormKey, ...]
 
 
-def tables(kind: str, text: str) -> tuple[Table, ...]:
+def tables(kind: str, text: str) -> tuple[FormTable, ...]:
     """The tables of a study of that kind with what ``text`` says in them, those that it has first.
 
     Raises `InputError` where the text is no TOML.
@@ -88,7 +88,7 @@ def as_toml(typed: str, widget: Widget) -> str:
 
 def _tables(
     path: str, node: Mapping[str, Any], definitions: Mapping[str, Any], data: Mapping[str, Any], depth: int
-) -> Iterator[Table]:
+) -> Iterator[FormTable]:
     """The table of a node of the schema, and those in it."""
     keys, inner = [], []
     for name, key in node.get("properties", {}).items():
@@ -98,7 +98,7 @@ def _tables(
             inner.append((where, {**of_table, "description": key.get("description", "")}))
         elif name != "schema":
             keys.append(_key(path, name, key, definitions, _at(data, path)))
-    yield Table(path, str(node.get("description", "")), tuple(keys))
+    yield FormTable(path, str(node.get("description", "")), tuple(keys))
     for where, of_table in inner:
         yield from _tables(where, of_table, definitions, data, depth + 1)
 
@@ -114,7 +114,7 @@ def _table_of(key: Mapping[str, Any], definitions: Mapping[str, Any]) -> Mapping
 
 def _key(
     path: str, name: str, key: Mapping[str, Any], definitions: Mapping[str, Any], table: Mapping[str, Any]
-) -> Key:
+) -> FormKey:
     """A key of a table of the schema, and what the study says of it."""
     options = [each for each in key.get("anyOf", [key]) if each.get("type") != "null"]
     one = options[0] if len(options) == 1 else {}
@@ -134,7 +134,7 @@ def _key(
     shown = "" if value is None else value if widget in ("text", "choice") else toml(value)
     examples = key.get("examples") or [""]
     example = examples[0] if isinstance(examples[0], str) else toml(examples[0])
-    return Key(path, name, str(key.get("description", "")), widget, choices, example, str(shown))
+    return FormKey(path, name, str(key.get("description", "")), widget, choices, example, str(shown))
 
 
 def _at(data: Mapping[str, Any], path: str) -> Mapping[str, Any]:

@@ -55,7 +55,7 @@ autocomplete="current-password"></label> <button>Open</button></form>"""
 
 
 @dataclass(frozen=True)
-class Key:
+class AccessKey:
     """The secret of one run of the workbench, and the password that gives it to a browser; empty without one."""
 
     secret: str
@@ -90,7 +90,7 @@ class Guard:
     """
 
     app: App
-    key: Key
+    key: AccessKey
     names: frozenset[str]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Note, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Note, Panel, Strips
 
 _MANY, _FEW = 2400, 150
 """Points of a line beyond which the graphics processor draws it, and below which each is marked."""
@@ -96,7 +96,7 @@ def _traces(panel: Panel, axis: str) -> Iterator[dict[str, Any]]:
                     "marker": {"color": mark.colour, "size": mark.size},
                     "hovertemplate": f"{'%{customdata}: ' if mark.words else ''}%{{y:.4g}}{of}<extra></extra>",
                 }  # fmt: skip
-            case Band():
+            case Area():
                 edge: dict[str, Any] = {
                     "type": "scatter",
                     "mode": "lines",

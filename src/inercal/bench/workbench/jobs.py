@@ -31,7 +31,7 @@ _PATIENCE = 5.0
 """Time [s] after which a cancelled command that goes on is killed."""
 
 
-class State(StrEnum):
+class JobState(StrEnum):
     """The state of a job."""
 
     WAITING = "waiting"
@@ -42,7 +42,7 @@ class State(StrEnum):
     INTERRUPTED = "interrupted"
 
 
-ENDED = frozenset({State.DONE, State.REFUSED, State.CANCELLED, State.INTERRUPTED})
+ENDED = frozenset({JobState.DONE, JobState.REFUSED, JobState.CANCELLED, JobState.INTERRUPTED})
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Job:
     session: str
     arguments: tuple[str, ...]
     where: Path
-    state: State
+    state: JobState
     made: str
     code: int | None = None
 
@@ -159,7 +159,7 @@ class Queue:
             folder.mkdir()
             words = tuple(word.replace("{out}", os.path.relpath(folder, where)) for word in arguments)
             made = datetime.now(UTC).isoformat(timespec="seconds")
-            job = Job(folder.name, folder, session, words, where, State.WAITING, made)
+            job = Job(folder.name, folder, session, words, where, JobState.WAITING, made)
             _tell(job)
             self._jobs[job.id] = job
             self._changed.notify_all()
@@ -179,7 +179,7 @@ class Queue:
             job = self.get(number)
             if job.state in ENDED:
                 return job
-            job = replace(job, state=State.CANCELLED)
+            job = replace(job, state=JobState.CANCELLED)
             self._put(job)
             process = self._process if self._running == number else None
         if process is not None:
@@ -216,7 +216,7 @@ class Queue:
     def _seen(self, job: Job) -> Job:
         """A job that was found, refused where it waits and is not to be run."""
         try:
-            if job.state is State.WAITING:
+            if job.state is JobState.WAITING:
                 self._check(job)
         except (InercalError, OSError, ValueError) as error:
             return _refused(job, error)
@@ -249,9 +249,9 @@ class Queue:
     def _run(self, job: Job) -> None:
         """Run a job to its end; raises what the system has against its process."""
         with self._changed:
-            if self._jobs[job.id].state is not State.WAITING:  # cancelled meanwhile
+            if self._jobs[job.id].state is not JobState.WAITING:  # cancelled meanwhile
                 return
-            job = replace(job, state=State.RUNNING)
+            job = replace(job, state=JobState.RUNNING)
             self._put(job)
             process = _begun(job, self._environment)
             self._process, self._running = process, job.id
@@ -261,13 +261,13 @@ class Queue:
         with self._changed:
             self._process, self._running = None, None
             job = self._jobs[job.id]
-            if job.state is State.RUNNING:
+            if job.state is JobState.RUNNING:
                 self._put(_ended(job))
             self._changed.notify_all()
 
     def _next(self) -> Job | None:
         """The job that has waited longest."""
-        return next((job for _, job in sorted(self._jobs.items()) if job.state is State.WAITING), None)
+        return next((job for _, job in sorted(self._jobs.items()) if job.state is JobState.WAITING), None)
 
 
 def _tell(job: Job) -> None:
@@ -291,7 +291,7 @@ def _refused(job: Job, error: Exception) -> Job:
     said = " ".join(spelt(why).split())
     with suppress(InercalError, OSError):
         write_text(job.folder / "said", f"inercal: error: {said}\n")
-    return replace(job, state=State.REFUSED, code=2)
+    return replace(job, state=JobState.REFUSED, code=2)
 
 
 def _begun(job: Job, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -312,8 +312,8 @@ def _ended(job: Job) -> Job:
     try:
         code = int(read_bytes(job.folder / "end"))
     except (OSError, ValueError):
-        return replace(job, state=State.INTERRUPTED)
-    return replace(job, state=State.DONE if code in (0, 1) else State.REFUSED, code=code)
+        return replace(job, state=JobState.INTERRUPTED)
+    return replace(job, state=JobState.DONE if code in (0, 1) else JobState.REFUSED, code=code)
 
 
 def _is_number(name: str) -> bool:
@@ -336,7 +336,7 @@ def _found(folder: Path) -> Job | None:
     """The job of a folder, as the program that ended left it; None where it is none."""
     try:
         about = json.loads(read_bytes(folder / _ABOUT))
-        state, code, arguments = State(about["state"]), about["code"], about["arguments"]
+        state, code, arguments = JobState(about["state"]), about["code"], about["arguments"]
         texts = [about["session"], about["where"], about["made"], *arguments]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -347,8 +347,8 @@ def _found(folder: Path) -> Job | None:
     if not (kept := _without_store(words)):
         return None
     job = Job(folder.name, folder, session, kept, Path(where), state, made, code)
-    if state is State.RUNNING:
+    if state is JobState.RUNNING:
         return _ended(job)
-    if state is State.WAITING and [session, where, made, *words] != texts:
+    if state is JobState.WAITING and [session, where, made, *words] != texts:
         return _refused(job, ValueError("found a text that no command can have, expected plain text"))
     return job

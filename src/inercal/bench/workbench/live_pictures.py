@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from inercal.bench.workbench import interactive
-from inercal.faces.report.marks import Axis, Band, Line, Mark, Panel
+from inercal.faces.report.marks import Area, Axis, Line, Mark, Panel
 from inercal.foundation.results.shown import rounded, short
 
 POINTS = 1000
@@ -43,7 +43,7 @@ def figure(columns: Sequence[str], rows: Rows, title: str) -> dict[str, Any]:
             for k in (0, places[title], band(columns, title))
         )
         if band(columns, title) is not None:
-            marks.append(Band(t, y - 2.0 * u, y + 2.0 * u, "± U (k = 2)", alpha=0.25))
+            marks.append(Area(t, y - 2.0 * u, y + 2.0 * u, "± U (k = 2)", alpha=0.25))
         marks.append(Line(t, y, title, width=1.5))
     return interactive.figure([Panel(marks, Axis(columns[0] if columns else "t [s]"), Axis(title))], 236.0)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from inercal.bench.workbench.measurements import Live
-from inercal.bench.workbench.rest_detector import Rest
+from inercal.bench.workbench.measurements import WishedMeasurement
+from inercal.bench.workbench.rest_detector import RestState
 from inercal.systems.imu.limits import LIMITS
 
 
-def status(live: Live) -> dict[str, Any]:
+def status(live: WishedMeasurement) -> dict[str, Any]:
     """The measurement at this moment, as plain objects."""
     of = live.measurement
     counts = of.counts
@@ -53,7 +53,7 @@ _STATES = {
 }
 
 
-def _words(live: Live) -> str:
+def _words(live: WishedMeasurement) -> str:
     """The state for people."""
     of = live.measurement
     if of.state == "ended" and of.failure:
@@ -63,14 +63,14 @@ def _words(live: Live) -> str:
     return _STATES[of.state]
 
 
-def _rest_words(rest: Rest) -> str:
+def _rest_words(rest: RestState) -> str:
     """Rest for people."""
     if rest.at is None:
         return f"Rest: not known, for nothing was quiet for {LIMITS.initial_rest:g} s yet."
     return f"At rest for {rest.long:.0f} s." if rest.at else "In motion."
 
 
-def rows(live: Live, after: int) -> dict[str, Any]:
+def rows(live: WishedMeasurement, after: int) -> dict[str, Any]:
     """Rows of the last two minutes that came after a number, with the number to ask with next."""
     number, found = live.measurement.rows(max(after, 0))
     kept = [[_finite(each) if isinstance(each, float) else each for each in row] for row in found]

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from inercal.bench.live.address import Mqtt, Pieces, Replay, Sink, Source, Text, sink_of, source_of
+from inercal.bench.live.address import Mqtt, PieceFolder, Replay, Sink, Source, Text, sink_of, source_of
 from inercal.bench.live.feed import frame_of
-from inercal.bench.live.measurement import Measurement, Plan
-from inercal.bench.workbench.rest_detector import Rest
+from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement
+from inercal.bench.workbench.rest_detector import RestState
 from inercal.bench.workbench.sessions import MAP, STUDY, Session, Sessions, safe_name
 from inercal.foundation.errors import InercalError, InputError, plain
 from inercal.foundation.records.maps import read_map
@@ -52,13 +52,13 @@ class Wish:
 
 
 @dataclass(frozen=True, eq=False)
-class Live:
+class WishedMeasurement:
     """A measurement of a session as it was wished for, the rest detector beside it, and the command that does the
     same."""
 
     wish: Wish
-    measurement: Measurement
-    rest: Rest
+    measurement: RunningMeasurement
+    rest: RestState
     command: str
     recording: Path | None
 
@@ -78,19 +78,19 @@ class Measurements:
     """All measurements that this workbench has begun, the last one of each session."""
 
     def __init__(self) -> None:
-        self._held: dict[str, Live] = {}
+        self._held: dict[str, WishedMeasurement] = {}
         self._lock = threading.Lock()
 
-    def of(self, session: Session) -> Live | None:
+    def of(self, session: Session) -> WishedMeasurement | None:
         """The measurement of a session, None without one."""
         return self._held.get(session.id)
 
     @property
-    def at_work(self) -> dict[str, Live]:
+    def at_work(self) -> dict[str, WishedMeasurement]:
         """Measurements that have not ended, by session."""
         return {number: live for number, live in self._held.items() if not live.ended}
 
-    def begin(self, session: Session, wish: Wish) -> Live:
+    def begin(self, session: Session, wish: Wish) -> WishedMeasurement:
         """Begin to measure; raises `InputError` where an address, study or map is wrong, or another is at work."""
         with self._lock:
             before = self.of(session)
@@ -106,7 +106,7 @@ class Measurements:
             self._held[session.id] = live
         return live
 
-    def stop(self, session: Session) -> Live:
+    def stop(self, session: Session) -> WishedMeasurement:
         """Ask a measurement to end in order; raises `InputError` where there is none."""
         live = self.of(session)
         if live is None:
@@ -139,7 +139,7 @@ def interval_of(text: str) -> float:
     return found
 
 
-def _prepared(session: Session, wish: Wish) -> Live:
+def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
     """A measurement that has not begun; raises `InputError`."""
     from inercal.faces.python.study import read_study
     from inercal.faces.stream.estimators import of_study
@@ -168,14 +168,14 @@ def _prepared(session: Session, wish: Wish) -> Live:
         if place.exists():
             raise InputError(place.name, "is there already, expected the name of a new file")
     folder.mkdir(exist_ok=True)
-    rest = Rest()
+    rest = RestState()
 
     def make(say: Say, say_finding: SayFinding) -> Make:
         return rest.beside(of_study(study, wish.every, say, say_finding))
 
     record_map = None if session.map is None else read_map(session.map)
-    measurement = Measurement(Plan(source, make, record_map, recording, sinks))
-    return Live(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
+    measurement = RunningMeasurement(MeasurementPlan(source, make, record_map, recording, sinks))
+    return WishedMeasurement(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
 
 
 def _own_source(source: Source, folder: Path) -> Source:
@@ -212,7 +212,7 @@ def _own_sink(sink: Sink, folder: Path) -> Sink:
             raise InputError("to", "found text:-, expected a file, for a page has no standard output")
         case Text(file=Path() as file):
             return Text(folder / FOLDER / _plain(file))
-        case Pieces():
+        case PieceFolder():
             return replace(sink, folder=folder / FOLDER / _plain(sink.folder))
         case Mqtt():
             return _own_broker(sink, folder)
@@ -233,7 +233,7 @@ def _command(session: Session, wish: Wish, sinks: Sequence[Sink], recording: Pat
     words += ["--map", MAP] if session.map is not None else []
     words += ["--record", f"{FOLDER}/{recording.name}"] if recording is not None else []
     for typed, sink in zip(wish.to, sinks, strict=True):
-        own = isinstance(sink, Text | Pieces)
+        own = isinstance(sink, Text | PieceFolder)
         words += ["--to", typed.replace(":", f":{FOLDER}/", 1) if own else typed]
     words += ["--every", f"{wish.every:g} s"] if wish.every else []
     return shlex.join(words)

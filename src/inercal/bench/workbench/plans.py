@@ -9,7 +9,7 @@ from typing import Any
 from inercal.faces.python.study import Study
 from inercal.faces.studies.text import parsed, toml, with_keys
 from inercal.foundation.errors import InputError
-from inercal.systems.contract import Plan
+from inercal.systems.contract import OfferedPlan
 
 
 def lines_of(study: Study) -> str:
@@ -18,12 +18,12 @@ def lines_of(study: Study) -> str:
     return "" if plan is None else "\n".join(", ".join(row) for row in plan.rows(study.settings))
 
 
-def named(plan: Plan) -> Mapping[str, Mapping[str, str]]:
+def named(plan: OfferedPlan) -> Mapping[str, Mapping[str, str]]:
     """Plans by their name, each as keys with their TOML; empty ones are taken out."""
     return {name: {key: _toml(value) for key, value in keys.items()} for name, keys in plan.named().items()}
 
 
-def with_lines(plan: Plan, text: str, lines: str) -> str:
+def with_lines(plan: OfferedPlan, text: str, lines: str) -> str:
     """The text of a study with the plan of these lines; raises `InputError` for lines that are none."""
     rows = [[word.strip() for word in line.split(",")] for line in lines.splitlines() if line.strip()]
     if not rows:
@@ -36,7 +36,7 @@ def with_lines(plan: Plan, text: str, lines: str) -> str:
     return with_keys(text, {key: _toml(value) for key, value in keys.items()})
 
 
-def with_found(plan: Plan, text: str, found: str) -> str:
+def with_found(plan: OfferedPlan, text: str, found: str) -> str:
     """The text of a study with the plan that its command wrote: TOML, or CSV with a line of joints."""
     if plan.ending == ".csv":
         return with_lines(plan, text, "\n".join(found.splitlines()[1:]))

@@ -14,7 +14,7 @@ from inercal.foundation.instruments.terms import shown_unit
 
 
 @dataclass(frozen=True)
-class Part:
+class ResidualKind:
     """Residuals of one kind: what they are, their unit for people, and of each (label, begin, end [s], value)."""
 
     what: str
@@ -22,7 +22,7 @@ class Part:
     rows: tuple[tuple[str, float, float, float], ...]
 
 
-def parts_of(result: Mapping[str, Any]) -> tuple[Part, ...]:
+def parts_of(result: Mapping[str, Any]) -> tuple[ResidualKind, ...]:
     """The residuals in the command's part of a result (`inercal.foundation.results.result.Estimate`); none where it
     has none."""
     found = [*_poses(result), *_turns(result), *_rests(result), *_unit_turns(result), *_points(result)]
@@ -45,10 +45,10 @@ def _span(rest: Any) -> tuple[float, float]:
     return float(rest[0]), float(rest[1])
 
 
-def _poses(result: Mapping[str, Any]) -> Iterator[Part]:
+def _poses(result: Mapping[str, Any]) -> Iterator[ResidualKind]:
     """Of |f| in the poses of an IMU moved by hand."""
     unit, size = shown_unit("m/s^2")
-    yield Part(
+    yield ResidualKind(
         "|f| − g of poses",
         unit,
         tuple(
@@ -59,10 +59,10 @@ def _poses(result: Mapping[str, Any]) -> Iterator[Part]:
     )
 
 
-def _turns(result: Mapping[str, Any]) -> Iterator[Part]:
+def _turns(result: Mapping[str, Any]) -> Iterator[ResidualKind]:
     """Of the turns between poses."""
     unit, size = shown_unit("rad")
-    yield Part(
+    yield ResidualKind(
         "miss of turns",
         unit,
         tuple(
@@ -78,7 +78,7 @@ def _turns(result: Mapping[str, Any]) -> Iterator[Part]:
     )
 
 
-def _rests(result: Mapping[str, Any]) -> Iterator[Part]:
+def _rests(result: Mapping[str, Any]) -> Iterator[ResidualKind]:
     """Of the rests of an IMU on a table, axis by axis, in the units of its outputs."""
     rests = [each for each in result.get("rests", ()) if isinstance(each, Mapping)]
     for sensor in ("acc", "gyro"):
@@ -90,10 +90,10 @@ def _rests(result: Mapping[str, Any]) -> Iterator[Part]:
                 for n, each in enumerate(rests, start=1)
                 if each.get(f"residual_{sensor}")
             ]
-            yield Part(f"{sensor}_{axis} at rest", text, tuple(rows))
+            yield ResidualKind(f"{sensor}_{axis} at rest", text, tuple(rows))
 
 
-def _unit_turns(result: Mapping[str, Any]) -> Iterator[Part]:
+def _unit_turns(result: Mapping[str, Any]) -> Iterator[ResidualKind]:
     """Of the turns of a strapdown unit, over their noise."""
     rests = [_span(each) for each in result.get("rests", ())]
     rows = [
@@ -103,20 +103,20 @@ def _unit_turns(result: Mapping[str, Any]) -> Iterator[Part]:
         )
         if each.get("residual_z") is not None
     ]
-    yield Part("turns, over noise", "1", tuple(rows))
+    yield ResidualKind("turns, over noise", "1", tuple(rows))
 
 
-def _points(result: Mapping[str, Any]) -> Iterator[Part]:
+def _points(result: Mapping[str, Any]) -> Iterator[ResidualKind]:
     """Scatter of the angle within the points of a run in a tunnel."""
     rows = [
         (f"point {each['number']:g}", each["begin"], each["end"], math.degrees(each["scatter"]))
         for each in result.get("points") or ()
         if each.get("scatter") is not None and each.get("number") is not None
     ]
-    yield Part("scatter of points", "deg", tuple(rows))
+    yield ResidualKind("scatter of points", "deg", tuple(rows))
 
 
-def figure(parts: Sequence[Part], chosen: str = "") -> dict[str, Any]:
+def figure(parts: Sequence[ResidualKind], chosen: str = "") -> dict[str, Any]:
     """Residuals over the time of the recording, a panel for each kind; the ``chosen`` one is marked."""
     panels = []
     for title in dict.fromkeys(map(_panel, parts)):
@@ -133,12 +133,12 @@ def figure(parts: Sequence[Part], chosen: str = "") -> dict[str, Any]:
     return interactive.figure(panels, 210.0)
 
 
-def span_of(parts: Sequence[Part], label: str) -> tuple[float, float]:
+def span_of(parts: Sequence[ResidualKind], label: str) -> tuple[float, float]:
     """The stretch (begin, end) [s] of the residual of that label."""
     return next((begin, end) for part in parts for name, begin, end, _ in part.rows if name == label)
 
 
-def _panel(part: Part) -> str:
+def _panel(part: ResidualKind) -> str:
     """The title of the panel that a part is drawn in: axes of a sensor share one."""
     of = part.what.split("_")[0] if part.what[-4:] == "rest" else part.what
     return f"{of} [{part.unit}]"

@@ -21,7 +21,7 @@ from inercal.bench.workbench.bench import Bench, said_of
 from inercal.bench.workbench.guard import REPORT_POLICY
 from inercal.bench.workbench.jobs import Job
 from inercal.bench.workbench.live_status import rows, status
-from inercal.bench.workbench.measurements import FOLDER, Live, Wish, interval_of, recordings
+from inercal.bench.workbench.measurements import FOLDER, Wish, WishedMeasurement, interval_of, recordings
 from inercal.bench.workbench.sessions import Session, receive, safe_name
 from inercal.foundation.errors import InercalError, InputError, spelt
 
@@ -39,7 +39,7 @@ class Wanted(BaseModel):
 def add_live(app: FastAPI, bench: Bench, file: Callable[[Path, str], FileResponse]) -> None:
     """Add the routes of measurements; ``file`` gives a file of a folder."""
 
-    def of(number: str) -> Live:
+    def of(number: str) -> WishedMeasurement:
         session = bench.sessions.get(number)
         live = bench.measurements.of(session)
         if live is None:
@@ -92,7 +92,7 @@ class Asked(BaseModel):
     rate: str | None = None
 
 
-class Certified(BaseModel):
+class CertificateWish(BaseModel):
     """The wish for a certificate: its number."""
 
     number: str
@@ -245,7 +245,7 @@ def rest_of(bench: Bench) -> FastAPI:
         return _of_job(bench.compare(bench.queue.get(earlier), bench.queue.get(number)))
 
     @app.post("/jobs/{number}/certificate", status_code=202)
-    def certify(number: str, certified: Certified) -> dict[str, Any]:
+    def certify(number: str, certified: CertificateWish) -> dict[str, Any]:
         """Write a certificate of the result of a job, with what the laboratory states."""
         return _of_job(bench.certify(bench.queue.get(number), certified.number))
 

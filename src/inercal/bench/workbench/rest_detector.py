@@ -18,7 +18,7 @@ _LOOK = 0.2
 """Time [s] between two rows of the monitor."""
 
 
-class Rest:
+class RestState:
     """Rest of the instrument as the monitor tells it, whatever is measured: ``at`` rest (None where it is not known),
     and for how ``long`` [s]."""
 
@@ -39,7 +39,7 @@ class Rest:
             except InercalError:  # no sensor that it could look at
                 return inner
             load_kernels()
-            return _Beside(inner, monitor, self)
+            return _WithMonitor(inner, monitor, self)
 
         return both
 
@@ -51,10 +51,10 @@ class Rest:
         self.long = math.nan if isinstance(long, str) else long
 
 
-class _Beside:
+class _WithMonitor:
     """An estimator with a monitor beside it (`inercal.faces.stream.run.Recursive`)."""
 
-    def __init__(self, inner: Recursive[Any], monitor: Monitor, rest: Rest) -> None:
+    def __init__(self, inner: Recursive[Any], monitor: Monitor, rest: RestState) -> None:
         self.inner, self.kind, self.columns = inner, inner.kind, inner.columns
         self._monitor: Monitor | None = monitor
         self._state, self._rest = monitor.initial(), rest

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.guard import Guard, Key
+from inercal.bench.workbench.guard import AccessKey, Guard
 from inercal.foundation.errors import InputError, MissingExtraError
 
 HERE = "127.0.0.1"
@@ -29,7 +29,7 @@ class Door:
     password: str = ""
 
 
-def application(bench: Bench, key: Key, names: frozenset[str]) -> Any:
+def application(bench: Bench, key: AccessKey, names: frozenset[str]) -> Any:
     """The ASGI application: guard, REST and pages. Raises `MissingExtraError` without NiceGUI."""
     try:
         from fastapi import FastAPI
@@ -68,7 +68,7 @@ def serve(bench: Bench, door: Door, told: Callable[[str], None], browser: bool =
 
     Raises `InputError` where the port is taken, `MissingExtraError` without NiceGUI.
     """
-    key = Key(secrets.token_urlsafe(32), door.password)
+    key = AccessKey(secrets.token_urlsafe(32), door.password)
     names = (
         {"localhost", HERE} if door.host == HERE else {"localhost", socket.gethostname(), socket.getfqdn()}
     )

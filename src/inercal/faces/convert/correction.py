@@ -98,7 +98,7 @@ class Correction:
         return tuple(findings)
 
 
-class Model(Protocol):
+class CalibratedInstrument(Protocol):
     """An instrument that a calibration describes."""
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
@@ -113,8 +113,8 @@ class Uncertain:
     coefficients propagated to first order (GUM 5.2), whatever the model. Noise of the sample itself is not in it.
     """
 
-    model: Model
-    moved: tuple[tuple[Model, Model], ...]
+    model: CalibratedInstrument
+    moved: tuple[tuple[CalibratedInstrument, CalibratedInstrument], ...]
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of the model, with a column ``u_`` for each that it writes."""
@@ -140,7 +140,7 @@ class Uncertain:
 
 
 def uncertain(
-    make: Callable[[Estimate], Model], estimate: Estimate, where: object = "calibration"
+    make: Callable[[Estimate], CalibratedInstrument], estimate: Estimate, where: object = "calibration"
 ) -> Uncertain:
     """The model that ``make`` makes of an estimate, with its uncertainty.
 
@@ -160,8 +160,9 @@ def uncertain(
     return Uncertain(make(estimate), moved)
 
 
-def apply_to(record: Record, model: Model, invert: bool = False) -> Record:
-    """Correct the columns of a record that a model covers, all others unchanged; raises as `Model.correction` does.
+def apply_to(record: Record, model: CalibratedInstrument, invert: bool = False) -> Record:
+    """Correct the columns of a record that a model covers, all others unchanged; raises as
+    `CalibratedInstrument.correction` does.
 
     With ``invert`` the record holds true values and the outputs of the instrument are made of them. What of it is not
     corrected, or lies outside the range of the calibration, is among the findings.

@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from inercal.faces.convert import correct, over_temperature, platform, rate_test, table, table_result
-from inercal.faces.convert.correction import Correction, Model, temperature_range, uncertain, watching
+from inercal.faces.convert.correction import (
+    CalibratedInstrument,
+    Correction,
+    temperature_range,
+    uncertain,
+    watching,
+)
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.records.record import Record
@@ -21,7 +27,7 @@ TABLE = "calibrate turntable"
 class InUse:
     """A ``model`` that watches the temperature of a record: ``span`` is that of its calibration, if it says."""
 
-    model: Model
+    model: CalibratedInstrument
     span: tuple[float, float, str] | None
     of_platform: bool = False
 
@@ -37,7 +43,7 @@ def model_of(estimate: Estimate, where: object = "calibration", uncertainty: boo
     `InputError`, naming ``where``, for an estimate that is no such calibration, or cannot be used.
     """
 
-    def make(each: Estimate) -> Model:
+    def make(each: Estimate) -> CalibratedInstrument:
         return _model(each, where)
 
     if not uncertainty:
@@ -59,7 +65,7 @@ def worth_knowing(estimate: Estimate, where: object = "calibration") -> tuple[Fi
     return (*bad, *kind.not_applied(estimate, where))
 
 
-def _model(estimate: Estimate, where: object) -> Model:
+def _model(estimate: Estimate, where: object) -> CalibratedInstrument:
     """The model of an estimate, by the command it is from."""
     match estimate.command:
         case platform.COMMAND:
@@ -74,7 +80,7 @@ def _model(estimate: Estimate, where: object) -> Model:
             return correct.imu_model(estimate, where)
 
 
-def _by_values(estimate: Estimate, where: object) -> Callable[[Mapping[str, Any]], Model]:
+def _by_values(estimate: Estimate, where: object) -> Callable[[Mapping[str, Any]], CalibratedInstrument]:
     """A function from values of the terms to a model, by the calibration at the reference temperature."""
     model = _model(estimate, where)
     match model:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.faces.convert.correction import Correction, Model, Samples, factor_of, one_clock
+from inercal.faces.convert.correction import CalibratedInstrument, Correction, Samples, factor_of, one_clock
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import is_channel
@@ -29,7 +29,7 @@ class OverTemperature:
     """An instrument whose terms are ``polynomials`` about ``reference`` [degC]; ``model_of`` takes their values
     (*batch,)."""
 
-    model_of: Callable[[Mapping[str, Any]], Model]
+    model_of: Callable[[Mapping[str, Any]], CalibratedInstrument]
     polynomials: Polynomials
     reference: float
 
@@ -49,7 +49,7 @@ class OverTemperature:
             settings={"polynomials": str(dict(self.polynomials)), "T0": self.reference, "invert": invert},
         )
 
-    def _at(self, d: Any) -> Model:
+    def _at(self, d: Any) -> CalibratedInstrument:
         return self.model_of({name: polynomial(c, d) for name, c in self.polynomials.items()})
 
 
@@ -89,7 +89,7 @@ class OutputOverTemperature:
 
 def over_temperature(
     estimate: Estimate,
-    instrument_of: Callable[[Estimate], Callable[[Mapping[str, Any]], Model]],
+    instrument_of: Callable[[Estimate], Callable[[Mapping[str, Any]], CalibratedInstrument]],
     where: object = "calibration",
 ) -> OverTemperature | OutputOverTemperature:
     """The instrument of an estimate of `inercal temperature`, of a sweep or of calibrations at several temperatures.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from inercal.faces.python.result import Result, View
-from inercal.foundation.noise.outcome import Noise, noise_of
+from inercal.foundation.noise.outcome import NoiseResult, noise_of
 from inercal.foundation.records.record import Record
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def allan(record: Record) -> Result:
     return of_noise(noise_of(record))
 
 
-def of_noise(noise: Noise) -> Result:
+def of_noise(noise: NoiseResult) -> Result:
     """The noise of the channels of a record as a result."""
 
     def tables() -> list[str]:

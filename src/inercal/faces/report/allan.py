@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from inercal.faces.report.html import Picture
 from inercal.faces.report.html import page as template
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Note, Panel
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Note, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.foundation.instruments.terms import NOISE_TERMS, noise_shown
-from inercal.foundation.noise.outcome import ChannelNoise, Noise
+from inercal.foundation.noise.outcome import ChannelNoise, NoiseResult
 from inercal.foundation.results.shown import aligned, rounded
 from inercal.foundation.units import parse_unit
 
@@ -45,7 +45,7 @@ def shown_units(unit: str) -> tuple[tuple[str, float], tuple[tuple[str, float], 
     return shown[SYMBOLS.index("B")], shown  # B is in the unit of the samples
 
 
-def cells(channel: ChannelNoise, noise: Noise) -> list[str]:
+def cells(channel: ChannelNoise, noise: NoiseResult) -> list[str]:
     """N, B, K, R and Q of a channel in units of the field: ``value ± u``, or ``< limit`` where they are not seen."""
     if channel.fit is None:
         return ["–"] * len(SYMBOLS)
@@ -80,7 +80,7 @@ def by_unit(channels: Iterable[ChannelNoise]) -> dict[str, list[ChannelNoise]]:
     return groups
 
 
-def table(noise: Noise) -> str:
+def table(noise: NoiseResult) -> str:
     """The coefficients as aligned text, one table for each unit."""
     parts = []
     for unit, channels in by_unit(noise.channels).items():
@@ -94,7 +94,7 @@ def table(noise: Noise) -> str:
     return "\n\n".join(parts)
 
 
-def curves_csv(noise: Noise) -> str:
+def curves_csv(noise: NoiseResult) -> str:
     """The curves as CSV, one row for each channel and averaging time, in SI."""
     lines = ["channel,unit,tau [s],deviation,lower,upper,fitted"]
     for channel in noise.channels:
@@ -105,7 +105,7 @@ def curves_csv(noise: Noise) -> str:
     return "\n".join(lines) + "\n"
 
 
-def pictures(noise: Noise) -> list[Picture]:
+def pictures(noise: NoiseResult) -> list[Picture]:
     """For each sensor the curves with their fits, slopes and residuals."""
     sensors: dict[str, list[ChannelNoise]] = {}
     for channel in noise.channels:
@@ -117,7 +117,7 @@ def pictures(noise: Noise) -> list[Picture]:
     ]
 
 
-def _picture(sensor: str, channels: Sequence[ChannelNoise], noise: Noise) -> Picture:
+def _picture(sensor: str, channels: Sequence[ChannelNoise], noise: NoiseResult) -> Picture:
     """Up to three channels of a sensor side by side, the residuals below."""
     text, _ = shown_units(channels[0].unit)[0]
     above, below = _common_limits(channels)
@@ -144,7 +144,7 @@ def _picture(sensor: str, channels: Sequence[ChannelNoise], noise: Noise) -> Pic
     )
 
 
-def _curve(channel: ChannelNoise, noise: Noise, up: Axis) -> Panel:
+def _curve(channel: ChannelNoise, noise: NoiseResult, up: Axis) -> Panel:
     """Deviation, limits, fit and slopes of one channel, on logarithmic axes."""
     (_, size), coefficients = shown_units(channel.unit)
     tau, deviation = channel.curve.tau, channel.deviation / size
@@ -154,7 +154,7 @@ def _curve(channel: ChannelNoise, noise: Noise, up: Axis) -> Panel:
         none = Note((0.5, 0.5), "no noise", ha="center", of_panel="xy", size=8.0)
         return Panel([none], across, replace(up, scale="linear", limits=None), channel.name)
     marks: list[Mark] = [
-        Band(tau, lower, upper, alpha=0.25),
+        Area(tau, lower, upper, alpha=0.25),
         Line(tau, deviation, width=0.7),
         Dots(tau, deviation, "measured", size=2.2),
     ]
@@ -205,7 +205,7 @@ def _residuals(channel: ChannelNoise, up: Axis) -> Panel:
     if channel.fit is not None:
         tau, used = channel.curve.tau, _used(channel)
         off, lower, upper = _off(channel)
-        marks.append(Band(tau, lower, upper, alpha=0.25))
+        marks.append(Area(tau, lower, upper, alpha=0.25))
         for chosen, colour in ((used, COLOURS[0]), (~used, QUIET)):
             marks.append(Dots(tau[chosen], off[chosen], colour=colour, size=2.2))
     return Panel(marks, Axis("averaging time [s]", "log"), up, grid="x")
@@ -241,7 +241,7 @@ def _common_limits(
     return above, (max(-largest, -100.0), largest)
 
 
-def page(noise: Noise) -> str:
+def page(noise: NoiseResult) -> str:
     """The page of the noise of an instrument: HTML that needs nothing but itself."""
     estimate = noise.estimate
     files = ", ".join(Path(s.path).name for s in estimate.inputs if not s.path.endswith(".toml"))  # no maps

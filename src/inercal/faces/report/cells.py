@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Band, Bars, Dots, Level, Line, Mark, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Bars, Dots, Level, Line, Mark, Panel, Strips
 from inercal.faces.report.style import INK, QUIET, WIDTH, figure, power_of_ten, svg
 from inercal.foundation.arrays import Array
 
@@ -168,7 +168,7 @@ def _frame(axes: Axes, cell: Cell, panel: Panel, numbered: bool, ha: Literal["le
     at = cell.left if ha == "left" else cell.left + 0.5 * cell.width
     if panel.title:
         axes.text(at, above, panel.title, fontsize=7.0, ha=ha, va="bottom", color=INK)
-    named = [mark for mark in panel.marks if isinstance(mark, Line | Dots | Band | Bars) and mark.label]
+    named = [mark for mark in panel.marks if isinstance(mark, Line | Dots | Area | Bars) and mark.label]
     for mark in reversed(named):
         axes.text(
             right,
@@ -200,7 +200,7 @@ def _mark(axes: Axes, cell: Cell, mark: Mark) -> None:
             place = float(cell.up(np.array(mark.at)))
             if mark.label and cell.bottom <= place <= top:
                 axes.text(right, place + 0.02, mark.label, fontsize=6.5, ha="right", va="bottom", color=INK)
-        case Band():
+        case Area():
             x, low, high = (np.asarray(each, dtype=float) for each in (mark.x, mark.low, mark.high))
             area = axes.fill_between(
                 cell.across(x), cell.up(low), cell.up(high), lw=0, color=mark.colour, alpha=mark.alpha

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from inercal.faces.report.cells import small
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Panel, Strips
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, INK, envelope, plain_unit
 from inercal.foundation.arrays import Array
@@ -28,7 +28,7 @@ _THREE = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class CoefficientCourse:
     """A coefficient over time: ``values`` (n,) and their ``u`` (n,) in ``unit``; ``prior`` standard deviation at the
     start about ``centre``, ``truth`` where known, ``bound`` the smallest u at the end that the path allows, where
     known."""
@@ -48,7 +48,7 @@ def few(count: int, most: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
-def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Picture:
+def converging(title: str, caption: str, t: Array, courses: Sequence[CoefficientCourse]) -> Picture:
     """Coefficients over ``t`` (n,) [s], three a row, with bands of two standard uncertainties.
 
     Each panel spans what is left in the last 45 % of the time; the prior is a bar at the start.
@@ -59,7 +59,7 @@ def converging(title: str, caption: str, t: Array, courses: Sequence[Course]) ->
         value, last, *_ = rounded(float(values[-1]), float(u[-1]))
         start = np.full(2, t[0] + 0.012 * (t[-1] - t[0]))
         marks: list[Mark] = [
-            Band(t[shown], (values - 2.0 * u)[shown], (values + 2.0 * u)[shown], alpha=0.2),
+            Area(t[shown], (values - 2.0 * u)[shown], (values + 2.0 * u)[shown], alpha=0.2),
             Line(*envelope(t, values, _PIECES), width=0.9),
             Line(start, course.centre + 2.0 * course.prior * np.array([-1.0, 1.0]), "", INK, 1.6),
         ]
@@ -75,7 +75,7 @@ def times(t: Array) -> Axis:
     return Axis("time [s]", limits=(float(t[0]), float(t[-1])))
 
 
-def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
+def _span(course: CoefficientCourse, values: Array, u: Array) -> tuple[float, float]:
     """Limits of the y axis: the band of the last 45 % of the time about the last value, truth included."""
     late = slice(11 * len(values) // 20, None)
     middle = float(values[-1]) if np.isfinite(values[-1]) else 0.0
@@ -87,7 +87,7 @@ def _span(course: Course, values: Array, u: Array) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def falling(title: str, caption: str, t: Array, courses: Sequence[Course]) -> Picture:
+def falling(title: str, caption: str, t: Array, courses: Sequence[CoefficientCourse]) -> Picture:
     """Standard uncertainties over their priors along ``t`` (n,) [s], on a logarithmic scale, three lines a panel.
 
     A dash at the end is the bound.
@@ -128,7 +128,7 @@ def panels_of_lines(
         marks: list[Mark] = [Level(0.0), *(Level(each, "", INK, 0.6, ":", upright=True) for each in changes)]
         if halves and label in halves:
             half = np.where(np.isfinite(halves[label]), halves[label], np.nan)[shown]
-            marks.append(Band(t[shown], -half, half, alpha=0.25))
+            marks.append(Area(t[shown], -half, half, alpha=0.25))
         for k, (name, points) in enumerate(zip(lines, thinned, strict=True)):
             dashes = (4.0 * k, (4.0, 4.0 * (count - 1) - 2.0)) if k else "-"
             said = name if count > 1 and not drawn else ""

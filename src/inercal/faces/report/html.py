@@ -216,7 +216,7 @@ def _heading(estimate: Estimate) -> list[tuple[str, str, str]]:
 
 
 @dataclass(frozen=True)
-class _Row:
+class _PrintedRow:
     """A coefficient as it is printed."""
 
     parameter: Parameter
@@ -228,9 +228,9 @@ class _Row:
     shares: tuple[float | None, ...]
 
 
-def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
+def _groups(estimate: Estimate) -> list[tuple[str, list[_PrintedRow]]]:
     """The coefficients by instrument, each with its printed numbers and its shares of the budget."""
-    groups: dict[str, list[_Row]] = {}
+    groups: dict[str, list[_PrintedRow]] = {}
     for p in estimate.parameters.values():
         begun = (name for name, ways in _GROUPS.items() if term(p.name) and p.name.startswith(ways))
         group = next(begun, "Coefficients")
@@ -238,13 +238,13 @@ def _groups(estimate: Estimate) -> list[tuple[str, list[_Row]]]:
     return list(groups.items())
 
 
-def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _Row:
+def _row(p: Parameter, budget: Sequence[BudgetItem]) -> _PrintedRow:
     """One coefficient, rounded as in `Estimate.table`."""
     value, u, U = rounded(p.value, p.u, p.U)
     of = term(p.name)
     name = "" if of is None else of.name
     dof = "∞" if p.dof >= _INFINITE else f"{p.dof:.{0 if p.dof >= 100 else 1}f}"
-    return _Row(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
+    return _PrintedRow(p, name, value, u, U, dof, tuple(item.share.get(p.name) for item in budget))
 
 
 def _percent(share: float) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from inercal.faces.report.cells import small
 from inercal.faces.report.courses import times
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Band, Bars, Line, Mark, Panel
+from inercal.faces.report.marks import Area, Axis, Bars, Line, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, QUIET, envelope
 from inercal.foundation.arrays import Array
@@ -46,7 +46,7 @@ def nis(t: Array, values: Array, dims: NDArray[np.int64]) -> Picture:
     low, high = chdtri(many, 1.0 - tail) / window, chdtri(many, tail) / window
     shown = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), 200)).round().astype(np.int64))
     marks: list[Mark] = [
-        Band(middle[shown], low[shown], high[shown], "95 % band", alpha=0.18),
+        Area(middle[shown], low[shown], high[shown], "95 % band", alpha=0.18),
         Line(*envelope(middle, run / window, 300), f"mean of {window} rows"),
         Line(middle[shown], many[shown] / window, "expected", QUIET, 0.7),
     ]
@@ -80,7 +80,7 @@ def innovations(t: Array, values: Array, channels: Sequence[str]) -> Picture:
         largest = float(np.max(np.abs(own), initial=0.0, where=np.isfinite(own)))
         top = max(4.0, 1.1 * min(largest, 1e6))
         over: list[Mark] = [
-            Band(t[[0, -1]], [-2.0, -2.0], [2.0, 2.0]),
+            Area(t[[0, -1]], [-2.0, -2.0], [2.0, 2.0]),
             Line(*envelope(t, own, 250), width=0.5),
         ]
         r, pairs = autocorrelation(own, _LAGS)
@@ -88,7 +88,7 @@ def innovations(t: Array, values: Array, channels: Sequence[str]) -> Picture:
         most = max(0.1, 1.1 * float(np.max(np.abs(r), initial=0.0)))
         lags, far = np.arange(1.0, len(r) + 1.0), np.abs(r) > limit
         beyond.append(f"{channel} {int(far.sum())}")
-        shifted: list[Mark] = [Band(lags, -limit, limit)]
+        shifted: list[Mark] = [Area(lags, -limit, limit)]
         for chosen, colour in ((~far, COLOURS[0]), (far, ALARM)):
             shifted.append(Bars(lags[chosen], 0.0 * r[chosen], r[chosen], "", colour, upright=True))
         heads = ("", "") if panels else ("innovation / its standard deviation", "autocorrelation")

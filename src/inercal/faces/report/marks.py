@@ -53,7 +53,7 @@ class Dots:
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
+class Area:
     """The area between ``low`` and ``high`` (n,) over ``x`` (n,); with ``steps``, ``x`` (n + 1,) are edges."""
 
     x: ArrayLike
@@ -151,7 +151,7 @@ class Arrows:
     width: float = 0.005
 
 
-Mark: TypeAlias = Line | Dots | Band | Strips | Level | Bars | Cells | Note | Arrows
+Mark: TypeAlias = Line | Dots | Area | Strips | Level | Bars | Cells | Note | Arrows
 
 
 @dataclass(frozen=True, eq=False)

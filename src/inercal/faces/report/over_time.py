@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from inercal.faces.report.cells import small
 from inercal.faces.report.courses import times
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Band, Bars, Level, Line, Mark, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Bars, Level, Line, Mark, Panel, Strips
 from inercal.faces.report.style import ALARM, COLOURS, INK, QUIET, envelope
 from inercal.foundation.arrays import Array
 
@@ -156,7 +156,7 @@ def _marks(panel: Signals, t: Array, cuts: NDArray[np.int64], pieces: int) -> li
         low, high = (thinned(t, each, cuts, pieces) for each in panel.band)
         if len(t) > 2 * pieces:  # the envelope of each edge goes down and up in turn
             low, high = (low[0][::2], low[1][::2]), (high[0][::2], high[1][1::2])
-        marks.append(Band(low[0], low[1], high[1], alpha=0.25))
+        marks.append(Area(low[0], low[1], high[1], alpha=0.25))
     marks += [Level(level, name, INK, 0.7, (0.0, (4.0, 3.0))) for name, level in panel.levels.items()]
     for k, (name, values) in enumerate(panel.lines.items()):
         said = name if len(panel.lines) > 1 else ""

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from inercal.faces.report.html import Picture
 from inercal.faces.report.marks import (
+    Area,
     Arrows,
     Axis,
-    Band,
     Bars,
     Cells,
     Colours,
@@ -203,12 +203,12 @@ def _mark(axes: Axes, mark: Mark, colours: Colours | None) -> None:
             )
         case Dots():
             _dots(axes, mark, colours)
-        case Band(steps=True):
+        case Area(steps=True):
             axes.stairs(
                 mark.high, mark.x, baseline=mark.low, fill=True, color=mark.colour, alpha=mark.alpha, lw=0,
                 label=mark.label or None,
             )  # fmt: skip
-        case Band():
+        case Area():
             axes.fill_between(
                 mark.x,
                 mark.low,

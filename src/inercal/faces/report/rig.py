@@ -21,7 +21,7 @@ _STEP = 0.34
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class DrawnTurn:
     """A joint: its ``name`` and the ``axis`` (3,), north, west, up, about which its angle counts right-handed."""
 
     name: str
@@ -29,14 +29,14 @@ class Turn:
 
 
 @dataclass(frozen=True, eq=False)
-class Triad:
+class DrawnTriad:
     """Three axes: their ``names``, and their directions (3, 3), north, west, up, in columns."""
 
     names: Sequence[str]
     axes: Array
 
 
-def rig(title: str, caption: str, joints: Sequence[Turn], instrument: Triad) -> Picture:
+def rig(title: str, caption: str, joints: Sequence[DrawnTurn], instrument: DrawnTriad) -> Picture:
     """A rig at zero angles, outer joint first: a ring for each joint with its axis and an arrow the way it turns plus,
     the axes of the instrument within, and north, west and up beside it."""
     marks: list[Mark] = []
@@ -47,7 +47,9 @@ def rig(title: str, caption: str, joints: Sequence[Turn], instrument: Triad) -> 
         marks += [*_ring(joint.axis, inner, radius, colour), *_turn(joint, outermost, colour)]
     marks += _triad(instrument, np.zeros(2), 0.66, INK)
     reach = 1.0 + _STEP * len(joints) + 0.45
-    marks += _triad(Triad(("north", "west", "up"), np.eye(3)), np.array([-reach - 1.15, -0.75]), 0.62, QUIET)
+    marks += _triad(
+        DrawnTriad(("north", "west", "up"), np.eye(3)), np.array([-reach - 1.15, -0.75]), 0.62, QUIET
+    )
     axes = Axis(limits=(-reach - 2.1, reach + 0.9)), Axis(limits=(-reach + 0.3, reach - 0.2))
     return draw(title, caption, [[Panel(marks, *axes, equal=True, bare=True)]], 3.4)
 
@@ -79,7 +81,7 @@ def _ring(axis: Array, inner: Array | None, radius: float, colour: str) -> list[
     return [Line(ring[:, 0], ring[:, 1], "", colour, 2.2)]
 
 
-def _turn(joint: Turn, radius: float, colour: str) -> list[Mark]:
+def _turn(joint: DrawnTurn, radius: float, colour: str) -> list[Mark]:
     """The axis of a joint, and around its plus end, outside all rings, an arrow the way it turns."""
     ends = _seen(np.outer([-(radius + 0.12), radius + 0.42], joint.axis))
     first, second = _across(joint.axis)
@@ -95,7 +97,7 @@ def _turn(joint: Turn, radius: float, colour: str) -> list[Mark]:
     ]
 
 
-def _triad(triad: Triad, at: Array, size: float, colour: str) -> list[Mark]:
+def _triad(triad: DrawnTriad, at: Array, size: float, colour: str) -> list[Mark]:
     """Three arrows from a point of the paper, with their names."""
     tips = _seen(size * triad.axes.T)
     start = np.tile(at, (3, 1))

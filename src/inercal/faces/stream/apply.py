@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inercal.faces.convert.correction import Model, Samples
+from inercal.faces.convert.correction import CalibratedInstrument, Samples
 from inercal.faces.convert.motion import HEAD, interval
 from inercal.faces.stream.lines import Lines, Sample
 from inercal.faces.stream.run import Output
@@ -57,7 +57,7 @@ class Apply:
     def __init__(
         self,
         lines: Lines,
-        model: Model,
+        model: CalibratedInstrument,
         invert: bool = False,
         say: Callable[[Finding], None] = lambda _: None,
     ) -> None:

@@ -21,8 +21,8 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.channels import Channel, may_be_empty
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.read.join import FileTable, check_present, conversion, row_rate
-from inercal.foundation.records.read.layout import Layout, comment_marks, find_layout, is_rounded
-from inercal.foundation.records.read.table import Part, Table
+from inercal.foundation.records.read.layout import TextLayout, comment_marks, find_layout, is_rounded
+from inercal.foundation.records.read.table import FileShare, RawTable
 from inercal.foundation.records.read.text import UNENDED, contents, locate
 from inercal.foundation.records.record import Record
 from inercal.foundation.records.stamps import beside
@@ -36,7 +36,7 @@ _PATIENCE = 3
 _SAID = 5
 
 
-class Line(NamedTuple):
+class StreamLine(NamedTuple):
     """A line: its bytes without the line end, its number from 1, and whether it has ended."""
 
     data: bytes
@@ -72,10 +72,10 @@ class _Field(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class _Form:
+class _Fields:
     """Fields of a row: ``time`` (None where rows are counted at ``rate`` [Hz]), values, and labels."""
 
-    layout: Layout
+    layout: TextLayout
     time: _Field | None
     rate: float
     fields: tuple[_Field, ...]
@@ -153,7 +153,7 @@ class Lines:
         last."""
         self._first, self._last = first, last
 
-    def next(self) -> Line | None:
+    def next(self) -> StreamLine | None:
         """The next line that holds a row, None at the end; waits for it."""
         if self._held:
             return self._held.pop(0)
@@ -162,7 +162,7 @@ class Lines:
                 return line
         return None
 
-    def sample(self, line: Line, row: int) -> Sample:
+    def sample(self, line: StreamLine, row: int) -> Sample:
         """The sample in a line, as row ``row`` of the record."""
         text, form = line.text, self._form
         for waiting in self._waiting:  # of a row that was not the last
@@ -216,7 +216,7 @@ class Lines:
             if count > _SAID:
                 self._say(Finding(code, f"{text}: {count - _SAID} more"))
 
-    def _value(self, field: _Field, value: float | None, silent: bool, line: Line) -> float:
+    def _value(self, field: _Field, value: float | None, silent: bool, line: StreamLine) -> float:
         """A value in its unit; NaN where there is none, which is said unless ``silent``."""
         if value is None or not math.isfinite(value):
             text = f"{field.name}: missing value"
@@ -230,7 +230,7 @@ class Lines:
             value *= factor
         return value
 
-    def _bad_row(self, line: Line) -> None:
+    def _bad_row(self, line: StreamLine) -> None:
         """Say that a row could not be read."""
         if line.whole:
             text = f"row other than {self._layout.width} fields with numbers, left as NaN"
@@ -244,7 +244,7 @@ class Lines:
         if self._flaws[code, text] <= _SAID:
             self._say(Finding(code, f"{text}{more}", f"line {line}"))
 
-    def _read(self) -> Line | None:
+    def _read(self) -> StreamLine | None:
         """The next line of any content."""
         data = self._stream.readline(_LONGEST)
         if not data:
@@ -256,12 +256,12 @@ class Lines:
             raise RecordError(
                 self.where, f"line {self._number}: longer than {_LONGEST} bytes, expected lines of text"
             )
-        return Line(data.rstrip(b"\r\n"), self._number, data.endswith(b"\n"))
+        return StreamLine(data.rstrip(b"\r\n"), self._number, data.endswith(b"\n"))
 
-    def _begin(self, record_map: RecordMap | None) -> tuple[_Form, list[Line]]:
+    def _begin(self, record_map: RecordMap | None) -> tuple[_Fields, list[StreamLine]]:
         """Fields of a row, from as few rows as show them, and the rows read for that."""
         part, path = _part(record_map), Path(self.where)
-        marks, rows = comment_marks(part.options), list[Line]()
+        marks, rows = comment_marks(part.options), list[StreamLine]()
         problem: InputError = RecordError(path, "ended without a row, expected a header and lines of numbers")
         while len(rows) < _PATIENCE and (line := self._read()) is not None:
             text = line.text.strip()
@@ -285,10 +285,10 @@ class Lines:
         raise problem
 
 
-def _part(record_map: RecordMap | None) -> Part:
+def _part(record_map: RecordMap | None) -> FileShare:
     """The part of a map that a stream is read by."""
     if record_map is None:
-        return Part(channels=None)
+        return FileShare(channels=None)
     if len(record_map.parts) != 1:
         raise MapError(
             record_map.path,
@@ -301,12 +301,16 @@ def _part(record_map: RecordMap | None) -> Part:
 
 
 def _form(
-    layout: Layout, indices: Mapping[Channel, int], path: Path, part: Part, record_map: RecordMap | None
-) -> _Form:
+    layout: TextLayout,
+    indices: Mapping[Channel, int],
+    path: Path,
+    part: FileShare,
+    record_map: RecordMap | None,
+) -> _Fields:
     """Fields of a row, checked as where files are joined."""
     source = Source(str(path), "")
     if record_map is not None:
-        table = Table(tuple(indices), {}, contents(layout), 0)
+        table = RawTable(tuple(indices), {}, contents(layout), 0)
         check_present([FileTable(path, source, part, table)], record_map.path)
     rate = None if record_map is None else record_map.rate
     if rate is None and any(channel.increment for channel in indices):
@@ -327,4 +331,4 @@ def _form(
     if not columns:
         raise RecordError(path, "found a time column alone, expected a channel")
     counted_at = math.nan if time is not None else row_rate(tuple(indices), rate, path)
-    return _Form(layout, time, counted_at, tuple(fields), label, Record(columns, (), (source,)))
+    return _Fields(layout, time, counted_at, tuple(fields), label, Record(columns, (), (source,)))

@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.faces.stream.doubt import Doubt, HeldRows
-from inercal.faces.stream.lines import Line, Lines, Sample
+from inercal.faces.stream.lines import Lines, Sample, StreamLine
 from inercal.foundation.computing.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
@@ -140,7 +140,7 @@ class Saving:
     before: Callable[[], None] = lambda: None
 
 
-class _Position(NamedTuple):
+class _RowsSeen(NamedTuple):
     """Rows that a state has seen: their number, CRC-32 of each of the first and of all, and the last sound stamp."""
 
     rows: int = 0
@@ -148,17 +148,17 @@ class _Position(NamedTuple):
     all: int = 0
     t: float = -math.inf
 
-    def after(self, line: Line, t: float) -> _Position:
+    def after(self, line: StreamLine, t: float) -> _RowsSeen:
         """The position after one more row."""
         head = np.append(self.head, zlib.crc32(line.data)) if self.rows < _HEAD else self.head
         crc = zlib.crc32(line.data, self.all)
-        return _Position(self.rows + 1, head, crc, t if math.isfinite(t) else self.t)
+        return _RowsSeen(self.rows + 1, head, crc, t if math.isfinite(t) else self.t)
 
 
 class _Whole(NamedTuple):
     """A saved state with its position, and the rows in doubt."""
 
-    position: _Position
+    position: _RowsSeen
     doubt: HeldRows
     state: Any
 
@@ -214,7 +214,7 @@ def _run(
     """As `run`, with the checkpoint to itself."""
     enough = estimator.enough if isinstance(estimator, Sufficient) else _never
     mark = fingerprint({"estimator": estimator.settings, "stream": lines.settings})
-    whole = _Whole(_Position(), HeldRows(), estimator.initial())
+    whole = _Whole(_RowsSeen(), HeldRows(), estimator.initial())
     if saving is not None and saving.path.exists():
         whole = load(saving.path, estimator.kind, mark, whole)
         say(f"resumed after row {whole.position.rows} of {saving.path}")
@@ -270,8 +270,8 @@ def _given(output: Output, after: float) -> bool:
 
 
 def _new_samples(
-    lines: Lines, position: _Position, interrupts: _Interrupts, say: Callable[[str], None]
-) -> Iterator[tuple[Line, Sample, bool]]:
+    lines: Lines, position: _RowsSeen, interrupts: _Interrupts, say: Callable[[str], None]
+) -> Iterator[tuple[StreamLine, Sample, bool]]:
     """The rows that are not in a position yet, and of the first whether rows before it were passed over by stamps;
     raises `RecordError` where they are not those that follow it.
 
@@ -290,7 +290,7 @@ def _new_samples(
             say(f"rows up to t = {passed} s are passed over")
         else:
             say("the stream goes on, no row is passed over")
-    later: list[tuple[Line, Sample]] = []
+    later: list[tuple[StreamLine, Sample]] = []
     for line in rows:
         sample = lines.sample(line, row + len(later))
         if sample.t <= passed:
@@ -315,12 +315,14 @@ def _new_samples(
             yield *each, earlier > 0 and k == 0
 
 
-def _begins_alike(rows: Iterator[Line], position: _Position, stamped: bool) -> tuple[bool, list[Line]]:
+def _begins_alike(
+    rows: Iterator[StreamLine], position: _RowsSeen, stamped: bool
+) -> tuple[bool, list[StreamLine]]:
     """True for a stream that begins, as far as it goes, with the rows that a position began with; the rows taken."""
     head = position.head[: 1 if stamped else _HEAD].tolist()
     if len(head) > 1 and len(set(head)) == 1:
         return False, []
-    held: list[Line] = []
+    held: list[StreamLine] = []
     for crc, line in zip(head, rows, strict=False):  # in this order no row is taken beyond the head
         held.append(line)
         if zlib.crc32(line.data) != crc:
@@ -328,9 +330,11 @@ def _begins_alike(rows: Iterator[Line], position: _Position, stamped: bool) -> t
     return True, held
 
 
-def _pass_over(rows: Iterator[Line], position: _Position, where: str, say: Callable[[str], None]) -> None:
+def _pass_over(
+    rows: Iterator[StreamLine], position: _RowsSeen, where: str, say: Callable[[str], None]
+) -> None:
     """Pass over the rows of a position; raises `RecordError` where they are others."""
-    seen = _Position()
+    seen = _RowsSeen()
     for line in rows:
         seen = seen.after(line, math.nan)
     if seen.rows < position.rows:
@@ -361,7 +365,7 @@ class _Interrupts:
             raise KeyboardInterrupt
         self._asked = True
 
-    def next(self, lines: Lines) -> Line | None:
+    def next(self, lines: Lines) -> StreamLine | None:
         """The next line, None at the end."""
         self.waiting = True
         if self._asked:

@@ -22,12 +22,18 @@ from inercal.faces.stream.run import Alarms, Output, Slots
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding
-from inercal.systems.selfcal.filters.filter_result import Estimates, History, State, Trace, estimate_of
+from inercal.systems.selfcal.filters.filter_result import (
+    Estimates,
+    FilterState,
+    RowHistory,
+    Trace,
+    estimate_of,
+)
 from inercal.systems.selfcal.filters.gaps import advance, held_rate, initial, usual
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.run import load_kernels as load_filter
 from inercal.systems.selfcal.filters.run import recursive
-from inercal.systems.selfcal.filters.second_pass import Kept
+from inercal.systems.selfcal.filters.second_pass import KeptRows
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import KA1, divisor
 from inercal.systems.selfcal.platform.recording import Steps
@@ -57,7 +63,7 @@ class SelfcalState(NamedTuple):
     """
 
     begun: bool
-    filter: State
+    filter: FilterState
     next: Array
     rate: Array
     rated: float
@@ -73,7 +79,7 @@ class SelfcalState(NamedTuple):
     gaps: int
     alarms: Alarms
     slots: Slots
-    kept: Kept
+    kept: KeptRows
 
 
 class Selfcal:
@@ -154,7 +160,7 @@ class Selfcal:
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
             rated=math.nan, read=math.nan, t=math.nan, steps=np.full(LIMITS.recent_intervals, np.nan), doubt=False,
             angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, alarms=Alarms(), slots=Slots(),
-            kept=Kept(),
+            kept=KeptRows(),
         )  # fmt: skip
 
     def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
@@ -187,7 +193,7 @@ class Selfcal:
             walked=np.array([walk]),
         )
         kept = state.kept.after(step, doubt, walk)
-        estimate: History | Estimates = trace.estimates
+        estimate: RowHistory | Estimates = trace.estimates
         if kept.full:
             filter_, kept = kept.passed(self._problem, filter_)
             estimate = estimate_of(filter_, self._problem)
@@ -230,7 +236,7 @@ class Selfcal:
         if not begun:
             return state._replace(begun=False), ()
         filter_ = initial(self._module, self._problem, th, np.where(np.isfinite(rate), rate, 0.0))
-        kept = Kept.of(self._problem.filter.kind, self._problem, th)
+        kept = KeptRows.of(self._problem.filter.kind, self._problem, th)
         state = state._replace(
             begun=True, filter=filter_, next=rate, t=t, read=t, doubt=False, angles=th, kept=kept
         )
@@ -308,7 +314,7 @@ class Selfcal:
         return state
 
     def _line(
-        self, state: SelfcalState, estimate: History | Estimates, nis: float
+        self, state: SelfcalState, estimate: RowHistory | Estimates, nis: float
     ) -> tuple[SelfcalState, Sequence[Output]]:
         """The state with its angles, and the line where one is due."""
         (row,) = rows(

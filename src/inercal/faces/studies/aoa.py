@@ -36,7 +36,7 @@ from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.keys import DEVIATION, FREQUENCY
 from inercal.foundation.units import Quantity, shown
-from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.disturbances import DELAY
 from inercal.systems.aoa.settings import (
@@ -247,8 +247,8 @@ class AoaStudyFile(Strict):
     points: Stated[PointPlan] = Field(
         default=PointPlan(), title="Points", description="stretches that are test points"
     )
-    alarm: Stated[Alarm] = Field(
-        default=Alarm(), title="Alarm", description="limits of the angle, for live measurements"
+    alarm: Stated[AlarmLimits] = Field(
+        default=AlarmLimits(), title="Alarm", description="limits of the angle, for live measurements"
     )
     layouts: dict[str, LayoutTable] = Field(
         default_factory=dict,
@@ -311,7 +311,7 @@ def aoa_study(data: Mapping[str, Any], path: str | Path) -> AoaSettings:
     )
 
 
-def _alarm(alarm: Alarm, path: str | Path) -> Alarm:
+def _alarm(alarm: AlarmLimits, path: str | Path) -> AlarmLimits:
     """The limits of the angle; refuses those between which there is nothing."""
     lowest, highest = alarm.lowest, alarm.highest
     if lowest is not None and highest is not None and not lowest < highest:

@@ -49,7 +49,7 @@ class ItemTable(Strict):
     owner: str = Field(default="", examples=["Flight Test"], description="whose it is")
 
 
-class PlaceTable(Strict):
+class AddressTable(Strict):
     """A laboratory, a company: its name and address."""
 
     name: str = Field(default="", examples=["Acme Calibration"], description="name")
@@ -61,7 +61,7 @@ class PlaceTable(Strict):
     phone: str = Field(default="", examples=["+49 30 1234"], description="telephone")
 
 
-class LaboratoryTable(PlaceTable):
+class LaboratoryTable(AddressTable):
     """The laboratory that calibrated; `inercal new lab` writes a file with all of its keys."""
 
     code: str = Field(default="", examples=["D-K-12345"], description="its code, or number of accreditation")

@@ -17,15 +17,15 @@ from inercal.foundation.units import Quantity, shown
 from inercal.systems.aoa.disturbances import (
     AngleShaking,
     Disturbances,
-    Line,
     Mains,
     Oscillation,
     Plunge,
     Shaking,
+    VibrationLine,
 )
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.motion import duration, moves
-from inercal.systems.aoa.settings import GYROS, Calibration, MotionPlan
+from inercal.systems.aoa.settings import GYROS, MotionPlan, SensorCalibration
 
 MOST_ROWS = 20_000_000
 """Samples that a simulation may have."""
@@ -150,7 +150,7 @@ class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
         description="the whole model goes up and down",
         examples=[{"level": "0.02 g", "frequency": "2 Hz"}],
     )
-    lines: list[Stated[Line]] = Field(
+    lines: list[Stated[VibrationLine]] = Field(
         default=[],
         description="lines of the tunnel's vibration, which shake the whole model",
         examples=[[{"frequency": "112 Hz", "level": "0.3 g"}]],
@@ -178,7 +178,7 @@ class AoaDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
 def disturbances_of(
     table: AoaDisturbancesTable,
     layout: Layout,
-    sensors: dict[str, Calibration],
+    sensors: dict[str, SensorCalibration],
     motion: MotionPlan | None,
     where: object,
 ) -> Disturbances:

@@ -25,8 +25,17 @@ from inercal.foundation._toml import Strict
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import Quantity, shown
 from inercal.systems.selfcal.limits import LIMITS
-from inercal.systems.selfcal.platform.joint_limits import ANY, JointLimits, Region
-from inercal.systems.selfcal.platform.plan import NO_LIMIT, JointName, Move, Plan, Rest, Turn, of_joints, path
+from inercal.systems.selfcal.platform.joint_limits import ANY, ForbiddenAngles, JointLimits
+from inercal.systems.selfcal.platform.plan import (
+    NO_LIMIT,
+    JointName,
+    Move,
+    PlatformPlan,
+    Rest,
+    Turn,
+    of_joints,
+    path,
+)
 from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals
 
 _ENDS = SeveralTexts(QuantityText("angle", "-90 deg"), "the lowest, the highest angle")
@@ -216,7 +225,7 @@ def joints_of(table: GimbalsTable, where: object) -> JointLimits:
         if not ranges:
             raise StudyError(where, f"rig.forbidden[{k + 1}]: found no angles, expected those of a joint")
         x, y, z = (ranges.get(name, ANY) for name in JOINTS)
-        regions.append(Region((x, y, z)))
+        regions.append(ForbiddenAngles((x, y, z)))
     return JointLimits(rate, acceleration, tuple(regions))
 
 
@@ -282,7 +291,7 @@ class MoveTexts(AsTyped):
         }
 
 
-class PlanTable(Strict):
+class CommandTable(Strict):
     """Commands to the gimbals: turns one after the other, or a path by its name."""
 
     turns: list[Annotated[TypedMove, MoveTexts()]] | None = Field(
@@ -300,16 +309,18 @@ class PlanTable(Strict):
     )
 
 
-def plan_of(table: PlanTable, fixed: Mapping[str, float], joints: JointLimits, where: object) -> Plan:
+def plan_of(
+    table: CommandTable, fixed: Mapping[str, float], joints: JointLimits, where: object
+) -> PlatformPlan:
     """The plan, as its ``joints`` can; those that are ``fixed`` [rad] as they are.
 
     Raises `StudyError` for neither or both of turns and path, too few or too many rows, or a turn of a fixed joint.
     """
     match table:
-        case PlanTable(turns=None, path=str(name)):
+        case CommandTable(turns=None, path=str(name)):
             plan = path(name)
-        case PlanTable(turns=list(turns), path=None):
-            plan = Plan(tuple(each.move for each in turns))
+        case CommandTable(turns=list(turns), path=None):
+            plan = PlatformPlan(tuple(each.move for each in turns))
         case _:
             given = "both turns and path" if table.turns else "neither turns nor path"
             raise StudyError(where, f"plan: found {given}, expected one of them")
@@ -330,7 +341,7 @@ def plan_of(table: PlanTable, fixed: Mapping[str, float], joints: JointLimits, w
     return plan
 
 
-def _with_fixed(plan: Plan, fixed: Mapping[str, float], stated: bool, where: object) -> Plan:
+def _with_fixed(plan: PlatformPlan, fixed: Mapping[str, float], stated: bool, where: object) -> PlatformPlan:
     """The plan with joints that do not turn at their angles; raises `StudyError` where it turns one of them, or begins
     elsewhere."""
     for k, name in enumerate(JOINTS):

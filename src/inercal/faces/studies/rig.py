@@ -17,9 +17,9 @@ from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.rig_errors import (
     EXPECTED,
     AngularErrorTable,
+    ErrorPlace,
     NamedErrorTable,
     OffsetErrorTable,
-    Place,
     elements_of,
 )
 from inercal.foundation._toml import Strict
@@ -108,7 +108,7 @@ def _errors(element: ElementTable, axis: Axis, jointed: bool, key: str, where: o
     distribution = element.distribution()
     if distribution is None and not element.measured:
         raise StudyError(where, f"{key}: found no distribution, expected {EXPECTED}, or what is measured")
-    made = elements_of(element, Place(element.error, axis, element.what, jointed, key, where))
+    made = elements_of(element, ErrorPlace(element.error, axis, element.what, jointed, key, where))
     if distribution is not None:
         scope = Scope.RIG if element.scope is None else Scope(element.scope)
         if scope is Scope.ANGLE and not jointed:
@@ -285,7 +285,7 @@ def chain_of(
             continue
         slot, distribution = by_name[name], error.distribution()
         if isinstance(error, NamedErrorTable) and error.measured:
-            place = Place(name, slot.axis, slot.what, name in after_joint, own, where)
+            place = ErrorPlace(name, slot.axis, slot.what, name in after_joint, own, where)
             parts[name] = elements_of(error, place)
         elif distribution is None:
             distribution = None if slot.is_offset else default

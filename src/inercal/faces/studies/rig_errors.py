@@ -166,7 +166,7 @@ class OffsetErrorTable(_Distributed):
 
 
 @dataclass(frozen=True)
-class Place:
+class ErrorPlace:
     """The place of an error in a chain: its name, its axis, words for it, and if a joint comes before it.
 
     ``key`` is that of the error in the study ``where``, for errors.
@@ -180,7 +180,7 @@ class Place:
     where: object
 
 
-def elements_of(table: NamedErrorTable, place: Place) -> list[Element]:
+def elements_of(table: NamedErrorTable, place: ErrorPlace) -> list[Element]:
     """Elements of an error beside its distribution: what is known of it, and how well.
 
     Raises `StudyError` for a table or harmonic before any joint, or a table that cannot be read.
@@ -236,7 +236,7 @@ def elements_of(table: NamedErrorTable, place: Place) -> list[Element]:
     return [*known, *made]
 
 
-def _read_table(name: str, place: Place) -> tuple[Array, Array, Array, Source]:
+def _read_table(name: str, place: ErrorPlace) -> tuple[Array, Array, Array, Source]:
     """Angles within one turn, in order, errors and u (m,) [rad] of a measured table, and its file."""
     path, key, where = Path(str(place.where)).parent / name, f"{place.key}.table: {shown(name)}", place.where
     head = "angle [deg],error [arcsec],u [arcsec]"

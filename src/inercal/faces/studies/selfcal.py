@@ -31,9 +31,9 @@ from inercal.faces.studies.laboratory import (
     traced,
 )
 from inercal.faces.studies.platform import (
+    CommandTable,
     GimbalsTable,
     PlacedRecordTable,
-    PlanTable,
     base_of,
     fixed_of,
     gimbals_of,
@@ -58,7 +58,7 @@ from inercal.systems.selfcal.settings import (
     Filter,
     Gating,
     Noise,
-    Placed,
+    RecordOnBase,
     Search,
     SelfcalSettings,
 )
@@ -154,7 +154,7 @@ class SearchTable(table_of(Search)):  # type: ignore[misc]
     )
 
 
-class HarmonicTable(Strict):
+class EncoderHarmonicTable(Strict):
     """An error of an encoder that repeats with its angle: amplitude times sin(order times angle + phase)."""
 
     axis: Literal["x", "y", "z"] = Field(description="the joint")
@@ -180,7 +180,7 @@ _ON_RIG: Any = create_model("OnRig", __base__=table_of(Disturbances), **true_err
 class DisturbancesTable(_ON_RIG):  # type: ignore[misc]
     """Disturbances that a simulation adds to the model; none if absent."""
 
-    harmonics: list[HarmonicTable] = Field(
+    harmonics: list[EncoderHarmonicTable] = Field(
         default=[],
         description="errors of the encoders; none if absent",
         examples=[[{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "0 deg"}]],
@@ -205,7 +205,7 @@ class SelfcalStudyFile(Strict):
         description="records on bases of their own, fitted together; one base for all if absent",
         examples=[[{"file": "south.csv", "heading": "180 deg"}]],
     )
-    plan: PlanTable | None = Field(
+    plan: CommandTable | None = Field(
         default=None, title="Plan", description="the path; a recording can do without"
     )
     truth: TruthTable | None = Field(
@@ -264,11 +264,11 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
     )
 
 
-def _placed(table: PlacedRecordTable, file: SelfcalStudyFile) -> Placed:
+def _placed(table: PlacedRecordTable, file: SelfcalStudyFile) -> RecordOnBase:
     """A record with its base."""
     base = base_of(file.rig, table)
     typed = file.rig.heading if table.heading is None else table.heading
-    return Placed(table.file, base, typed == "unknown", _prior(file.prior, base))
+    return RecordOnBase(table.file, base, typed == "unknown", _prior(file.prior, base))
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:

@@ -26,7 +26,7 @@ from inercal.foundation.errors import InputError, QuantityError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.units import Quantity, parse_quantity, parse_unit, shown
 from inercal.systems.aoa.layout import AXES, STATED, Layout
-from inercal.systems.aoa.settings import GYROS, Calibration, Per
+from inercal.systems.aoa.settings import GYROS, Per, SensorCalibration
 
 MOST = 24
 """Accelerometers that a study may have."""
@@ -255,7 +255,7 @@ def layouts_of(data: Mapping[str, Any], where: str | Path) -> dict[str, Layout]:
     return layouts
 
 
-def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibration]:
+def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, SensorCalibration]:
     """The calibration of each sensor that the study names.
 
     Raises `StudyError` for a bias that is none of this sensor, a calibration that cannot be read or does not hold the
@@ -268,7 +268,7 @@ def calibrations_of(table: SensorsTable, where: str | Path) -> dict[str, Calibra
     }
 
 
-def _calibration(name: str, table: Any, where: str | Path) -> Calibration:
+def _calibration(name: str, table: Any, where: str | Path) -> SensorCalibration:
     """The calibration of one sensor."""
     if table.calibration is not None:
         scale, bias, per, caution = _from_file(name, table, where)
@@ -276,8 +276,8 @@ def _calibration(name: str, table: Any, where: str | Path) -> Calibration:
         caution = ""
         scale, per = (1.0, "1") if table.scale is None else (table.scale.value, table.scale.per)
         bias = 0.0 if table.bias is None else _bias(name, table.bias, scale, per, where)
-    usual = Calibration()
-    return Calibration(
+    usual = SensorCalibration()
+    return SensorCalibration(
         scale=scale,
         bias=bias,
         range=None if table.range is None else table.range.value,

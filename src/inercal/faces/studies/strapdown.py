@@ -46,16 +46,16 @@ from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.strapdown.model.coefficients import OPTIONS, names
 from inercal.systems.strapdown.settings import (
     ESTIMABLE,
-    Design,
     Goal,
     Motion,
     Noise,
-    Plan,
+    PathDesign,
     Prior,
     Rests,
     Start,
     StrapdownSettings,
     Term,
+    TurnPlan,
 )
 
 FEWEST_ROWS, MOST_ROWS = 100, 20_000_000
@@ -193,7 +193,7 @@ class RestsTable(table_of(Rests)):  # type: ignore[misc]
     )
 
 
-class PlanTable(table_of(Plan)):  # type: ignore[misc]
+class PlanTable(table_of(TurnPlan)):  # type: ignore[misc]
     """The plan of a test, or of a simulated recording."""
 
     start: Annotated[Several, SeveralTexts(ExactText("angle", "0 deg"), "pitch, roll, yaw")] | None = Field(
@@ -224,7 +224,7 @@ class StrapdownStudyFile(Strict):
     plan: PlanTable | None = Field(
         default=None, title="Plan", description="the plan of a test, or of a simulated recording"
     )
-    design: Stated[Design] | None = Field(
+    design: Stated[PathDesign] | None = Field(
         default=None,
         title="Design",
         description="the search for a path; without this table the plan is judged alone",
@@ -308,10 +308,10 @@ def _start(table: StartTable) -> Start:
     return Start(compass=None if table.heading is None else table.heading == "gyrocompass")
 
 
-def _plan(table: Any, path: str | Path) -> Plan:
+def _plan(table: Any, path: str | Path) -> TurnPlan:
     """The plan; refused where it has too many samples, or too few for its turns."""
     start = (0.0, 0.0, 0.0) if table.start is None else table.start.values
-    plan = settings_of(Plan, table, start=start, turns=tuple(each.turn for each in table.turns or ()))
+    plan = settings_of(TurnPlan, table, start=start, turns=tuple(each.turn for each in table.turns or ()))
     rows = plan.duration * plan.sample_rate
     if not FEWEST_ROWS <= rows <= MOST_ROWS:
         raise StudyError(path, f"plan: found {rows:.4g} samples, expected {FEWEST_ROWS} to {MOST_ROWS:.0e}")

@@ -40,9 +40,9 @@ from inercal.foundation.units import Quantity, Unit, parse_quantity
 from inercal.systems.turntable.settings import (
     Analysis,
     Constraint,
-    Design,
     Disturbances,
     Leg,
+    PositionDesign,
     RateTest,
     StepTest,
     TurntableSettings,
@@ -154,7 +154,7 @@ class ConstraintTable(Strict):
     below: Annotated[float, Field(gt=0.0, le=1.0)] = Field(description="what each index stays below")
 
 
-class DesignTable(table_of(Design)):  # type: ignore[misc]
+class DesignTable(table_of(PositionDesign)):  # type: ignore[misc]
     """The search for positions."""
 
     candidates: GridTable | None = Field(
@@ -289,7 +289,7 @@ def _analysis(table: AnalysisTable, where: object) -> Analysis:
     return settings_of(Analysis, table, outputs=tuple(table.outputs))
 
 
-def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> Design:
+def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> PositionDesign:
     """Settings of a search for positions."""
     constraint = None
     if table.sensitivity is not None:
@@ -299,7 +299,7 @@ def _design(table: DesignTable, chain: Chain, limits: Limits, where: object) -> 
         _once(limit.outputs, "design.sensitivity.outputs", where)
         constraint = Constraint(tuple(limit.factors), tuple(limit.outputs), limit.below)
     return settings_of(
-        Design,
+        PositionDesign,
         table,
         candidates=grid_of(table.candidates, chain, limits, "design.candidates", where, half=False),
         compare=compared(table.compare, chain, limits, where),

@@ -12,7 +12,7 @@ from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.positions.simulate import simulate
-from inercal.systems.turntable.settings import Design, Instrument, TurntableSettings
+from inercal.systems.turntable.settings import Instrument, PositionDesign, TurntableSettings
 from inercal.systems.turntable.task import calibrate
 
 TABLE = "two_axis_turntable"
@@ -83,7 +83,7 @@ def settings_of(coefficients: dict[str, float], noise: float | None, latitude: f
         rig=TABLE,
         chain=turntable(TABLE, uniform(TOLERANCE)),
         plan=grid((6, 6)),
-        design=Design(grid((36, 36))),
+        design=PositionDesign(grid((36, 36))),
         instrument=Instrument(
             unit=unit, coefficients=coefficients, noise=None if noise is None else noise * unit.factor
         ),

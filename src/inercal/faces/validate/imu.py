@@ -18,7 +18,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.ferraris.method import NAMES
-from inercal.systems.imu.ferraris.simulate import Session, quiet, simulate_session, true_values
+from inercal.systems.imu.ferraris.simulate import SessionCourse, quiet, simulate_session, true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
 from inercal.systems.imu.simulate import draw_full_truth
 from inercal.systems.imu.task import calibrate
@@ -193,7 +193,7 @@ _SEED = 20230518
 def _session() -> tuple[Estimate, Array]:
     """Six positions and three turns of an instrument without noise: the calibration and the truth (33,)."""
     rng = np.random.default_rng(_SEED)
-    record, truth = simulate_session(quiet(draw_full_truth(rng)), Session(), rng)
+    record, truth = simulate_session(quiet(draw_full_truth(rng)), SessionCourse(), rng)
     settings = ImuSettings(Site(9.81), method=FerrarisSettings())
     return calibrate(record, settings).estimate, true_values(truth)
 

@@ -17,7 +17,7 @@ from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import KA0, KG0, NAMES, to_linear
-from inercal.systems.selfcal.platform.plan import Plan, Rest, motion, path
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, motion, path
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.settings import Noise, SelfcalSettings
 
@@ -33,10 +33,10 @@ def _study() -> SelfcalSettings:
 
 def _at_rest(noise: Noise, prior: Array) -> PathBounds:
     """Bounds of a platform that rests for 100 s, rows every 0.5 s, on an earth that does not turn."""
-    asked = replace(_study(), plan=Plan((Rest(100.0),), step=0.5), noise=noise, prior=prior)
+    asked = replace(_study(), plan=PlatformPlan((Rest(100.0),), step=0.5), noise=noise, prior=prior)
     posed = problem(asked)
     posed = replace(posed, world=posed.world._replace(earth=np.zeros(3)))
-    return bounds(motion(Plan((Rest(100.0),), step=0.5), posed.world), posed)
+    return bounds(motion(PlatformPlan((Rest(100.0),), step=0.5), posed.world), posed)
 
 
 def _known_but(chosen: slice, prior: float) -> Array:

@@ -28,7 +28,7 @@ from inercal.foundation.designs.search import from_starts
 from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.foundation.designs.exchange_kernel import State
+    from inercal.foundation.designs.exchange_kernel import DesignState
 
 Indices = NDArray[np.intp]
 
@@ -194,9 +194,9 @@ def _first_least(values: Array) -> int:
     return int(np.argmax(values <= least + TIE * abs(least)))
 
 
-def _state(rows: Array, p: int, weights: Array | None, M: Array) -> State:
+def _state(rows: Array, p: int, weights: Array | None, M: Array) -> DesignState:
     """Quantities that the exchanges of a design of information ``M`` use; ``rows`` (c, d, m) of the candidates."""
-    from inercal.foundation.designs.exchange_kernel import State, along, own_products, update
+    from inercal.foundation.designs.exchange_kernel import DesignState, along, own_products, update
 
     c, d, _ = rows.shape
     P = np.asarray(np.linalg.inv(M), dtype=float)
@@ -206,6 +206,6 @@ def _state(rows: Array, p: int, weights: Array | None, M: Array) -> State:
         common = update(np.ascontiguousarray(rows[:, p:]), np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
     if weights is None:
         none = np.empty((c, d, 0))
-        return State(whole, common, d > p, none, none, 0.0)
+        return DesignState(whole, common, d > p, none, none, 0.0)
     H = along(whole.G, weights)
-    return State(whole, common, d > p, H, own_products(H, whole.G), float(np.sum(P * weights)))
+    return DesignState(whole, common, d > p, H, own_products(H, whole.G), float(np.sum(P * weights)))

@@ -31,7 +31,7 @@ class Update(NamedTuple):
     added: Array
 
 
-class State(NamedTuple):
+class DesignState(NamedTuple):
     """A design on its way: of the ``whole`` information and, where ``errors`` are common to positions, of those alone
     (``common``); for the trace H = G weights (c, d, m) and K = H_j G_j^T (c, c, m), empty for the determinant,
     and the ``trace`` itself."""
@@ -81,7 +81,7 @@ def own_products(left: Array, right: Array) -> Array:
 
 
 @allocating
-def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
+def best_exchange(state: DesignState, i: int, taken: Mask) -> tuple[int, float]:
     """The candidate, not one ``taken`` (m,), that lessens the criterion most in the place of i, the first of equals,
     and its factor of the determinant or trace of the covariance."""
     whole, common, errors, H, K_own, trace = state
@@ -108,7 +108,7 @@ def best_exchange(state: State, i: int, taken: Mask) -> tuple[int, float]:
 
 
 @allocating
-def next_exchange(state: State, chosen: NDArray[np.intp], k: int, taken: Mask) -> tuple[int, int]:
+def next_exchange(state: DesignState, chosen: NDArray[np.intp], k: int, taken: Mask) -> tuple[int, int]:
     """The first place of a design ``chosen`` (n,), from k on and then from 0, in which an exchange improves it by more
     than rounding, and the candidate for it; -1 where none does."""
     n = len(chosen)

@@ -14,7 +14,7 @@ Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.int64]
 
 
-class Row(NamedTuple):
+class SlopeRow(NamedTuple):
     """Room for the derivative h of a scalar measurement by the state: zero but for ``values`` at ``places``, of which
     the first so many are used."""
 
@@ -23,13 +23,13 @@ class Row(NamedTuple):
 
 
 @allocating
-def empty_row(size: int) -> Row:
+def empty_row(size: int) -> SlopeRow:
     """Room for a row of at most ``size`` entries."""
-    return Row(np.empty(size, dtype=np.int64), np.empty(size))
+    return SlopeRow(np.empty(size, dtype=np.int64), np.empty(size))
 
 
 @kernel
-def innovation_variance(P: Array, row: Row, size: int, noise: float) -> float:
+def innovation_variance(P: Array, row: SlopeRow, size: int, noise: float) -> float:
     """Variance ``h P h^T + r`` of one measurement; arguments as in `scalar_update`."""
     places, values = row.places, row.values
     total = noise
@@ -43,7 +43,7 @@ def innovation_variance(P: Array, row: Row, size: int, noise: float) -> float:
 
 
 @kernel
-def scalar_update(P: Array, x: Array, row: Row, size: int, z: float, noise: float, work: Array) -> float:
+def scalar_update(P: Array, x: Array, row: SlopeRow, size: int, z: float, noise: float, work: Array) -> float:
     """Update an error state ``x`` (n,) and its covariance ``P`` (n, n), both in place, by one measurement.
 
     ``z = h x + v``, v of variance ``noise``. Measurements of one time are put in one after the other, with rows of one

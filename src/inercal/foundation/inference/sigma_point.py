@@ -105,7 +105,7 @@ def draw(P: Array, factor: int, spread: float, points: Points) -> None:
             columns[j, i] = spread * A[i, j]
 
 
-class Moments(NamedTuple):
+class ReadingMoments(NamedTuple):
     """Moments of m readings at all points of n states: their ``mean`` (m,) and ``covariance`` (m, m), the ``cross``
     covariance (n, m) with the state; ``odd`` (n, m), the half of each pair that a change of sign turns, is used up."""
 
@@ -116,13 +116,13 @@ class Moments(NamedTuple):
 
 
 @allocating
-def empty_moments(n: int, m: int) -> Moments:
+def empty_moments(n: int, m: int) -> ReadingMoments:
     """Room for the moments of ``m`` readings and ``n`` states."""
-    return Moments(np.empty(m), np.empty((m, m)), np.empty((n, m)), np.empty((n, m)))
+    return ReadingMoments(np.empty(m), np.empty((m, m)), np.empty((n, m)), np.empty((n, m)))
 
 
 @kernel
-def moments(z: Array, columns: Array, other: float, out: Moments) -> None:
+def moments(z: Array, columns: Array, other: float, out: ReadingMoments) -> None:
     """Moments of the readings at all points, where the centre weighs nothing.
 
     Parameters

@@ -18,7 +18,7 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.noise import SYMBOLS, allan_terms
 from inercal.foundation.noise.covariance import sums
-from inercal.foundation.noise.curve import Curve, Fit
+from inercal.foundation.noise.curve import AllanCurve, TermsFit
 from inercal.foundation.noise.deviation import AllanDeviation
 
 SPACING = 1.7
@@ -127,7 +127,7 @@ def noise_coefficients(
     lengths = deviation.lengths[rows]
     scale = float(np.max(deviation.deviation[rows, channel]))
     gain = deviation.gain[rows, channel]
-    whole = Curve(
+    whole = AllanCurve(
         (deviation.deviation[rows, channel] / scale) ** 2,
         allan_terms(lengths) * gain,
         deviation.terms[rows, channel] / (deviation.samples + 1.0 - 2.0 * lengths),
@@ -165,7 +165,7 @@ def _rows(deviation: AllanDeviation, channel: int, fit_range: tuple[float, float
     return rows
 
 
-def _tried(whole: Curve, columns: list[int], cut: bool) -> list[tuple[Curve, Array, float, int]]:
+def _tried(whole: AllanCurve, columns: list[int], cut: bool) -> list[tuple[AllanCurve, Array, float, int]]:
     """Curves, from the whole to ever later starts if ``cut`` is allowed, with squares and misfit; the last may fit."""
     tried = []
     curve, squares = whole, whole.squares(columns)
@@ -201,7 +201,7 @@ def _in_seconds(interval: float) -> Array:
 
 
 def _uncertain(
-    curve: Curve, fit: Fit, columns: list[int], unit: Array, inflation: float, chi2_dof: int
+    curve: AllanCurve, fit: TermsFit, columns: list[int], unit: Array, inflation: float, chi2_dof: int
 ) -> tuple[Array, Array, Array, dict[str, float]]:
     """Coefficients of a fit in their units, with all that makes them uncertain, and limits of the others."""
     others = [i for i in columns if i not in fit.seen]

@@ -21,7 +21,7 @@ _WIDEST = 1000.0  # of an upper limit, in standard deviations of a term that is 
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class TermsFit:
     """Terms fitted together: indices ``seen`` of those above zero, and their ``squares`` (5,).
 
     ``covariance`` (p, p) of the squares of ``seen`` and the ``weights`` (p, k) by which they follow from the variances.
@@ -34,7 +34,7 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class AllanCurve:
     """Allan ``variances`` (k,) over ``sums.lengths`` samples, and ``terms`` (k, 5): those of unit coefficients.
 
     Gaps left the ``share`` (k,) of the differences of adjacent means.
@@ -45,9 +45,9 @@ class Curve:
     share: Array
     sums: Sums
 
-    def without_first(self) -> Curve:
+    def without_first(self) -> AllanCurve:
         """The curve without its shortest averaging time."""
-        return Curve(self.variances[1:], self.terms[1:], self.share[1:], self.sums.without_first())
+        return AllanCurve(self.variances[1:], self.terms[1:], self.share[1:], self.sums.without_first())
 
     def covariance(self, squares: Array) -> Array:
         """Covariance (k, k) of the variances under noise of these squared coefficients."""
@@ -126,21 +126,21 @@ class Curve:
         shared = np.linalg.lstsq(W[:, seen] / size, W[:, i], rcond=None)[0] / size
         return W[:, i] - W[:, seen] @ shared, y, shared
 
-    def fitted(self, squares: Array) -> Fit:
+    def fitted(self, squares: Array) -> TermsFit:
         """A fit with its covariance."""
         seen = np.flatnonzero(squares)
         W, _, L = self.whitened(squares)
         size = np.linalg.norm(W[:, seen], axis=0)
         normal = np.linalg.inv((W[:, seen] / size).T @ (W[:, seen] / size)) / np.outer(size, size)
         weights = np.linalg.solve(L.T, W[:, seen])
-        return Fit(tuple(seen.tolist()), squares, normal, (weights @ normal).T)
+        return TermsFit(tuple(seen.tolist()), squares, normal, (weights @ normal).T)
 
-    def moves(self, fit: Fit, i: int) -> Array:
+    def moves(self, fit: TermsFit, i: int) -> Array:
         """Decrease of the squares (p,) of ``fit.seen`` if term ``i`` were fitted too; 0 for a negative term."""
         apart, y, shared = self._apart(i, fit.squares)
         return max(float(apart @ y / (apart @ apart)), 0.0) * shared
 
-    def dof(self, fit: Fit, which: int) -> float:
+    def dof(self, fit: TermsFit, which: int) -> float:
         """Degrees of freedom of Student's t for the coefficient ``fit.seen[which]``.
 
         See `inercal.foundation.noise.coefficients.noise_coefficients`.
@@ -157,7 +157,7 @@ class Curve:
             gradient[k] = (more - variance) / step[j]
         return float(2.0 * variance**2 / (gradient @ fit.covariance @ gradient))
 
-    def upper_limit(self, fit: Fit, i: int) -> float:
+    def upper_limit(self, fit: TermsFit, i: int) -> float:
         """One-sided 95 % limit of the square of a term that is not in the fit, to about 1 %.
 
         The smallest value under whose own noise an estimate as small as the one found has a probability below 5 %.

@@ -186,14 +186,14 @@ class ChannelNoise:
 
 @short_repr
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseResult:
     """The ``estimate`` and what it was made from."""
 
     estimate: Estimate
     channels: tuple[ChannelNoise, ...]
 
 
-def noise_of(record: Record) -> Noise:
+def noise_of(record: Record) -> NoiseResult:
     """Allan deviations and noise coefficients of every channel of a record at rest that measures motion.
 
     Raises `RecordError`: no such channel, hardly any samples, or time stamps that do not increase.
@@ -223,7 +223,7 @@ def noise_of(record: Record) -> Noise:
         replace(each, headline=f"{', '.join(names)}: {each.headline}") for each, names in channels_of.items()
     ]
     estimate = _assemble(record, channels, [*of_fits, *findings], disturbed)
-    return Noise(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
+    return NoiseResult(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
 
 
 def _groups(record: Record) -> list[list[Column]]:

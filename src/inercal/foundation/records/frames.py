@@ -65,7 +65,7 @@ class Frame:
         return sync, self.size, self.check_begin, self.order == "<", form, check.table
 
 
-class Found(NamedTuple):
+class FoundFrames(NamedTuple):
     """Frames that were found: ``rows`` (n,) of the fields, the ``consumed`` bytes, which need not be looked at again,
     those of them that were ``passed_over``, and the number of frames whose check failed."""
 
@@ -75,7 +75,7 @@ class Found(NamedTuple):
     damaged: int
 
 
-def frames_in(data: bytes, frame: Frame) -> Found:
+def frames_in(data: bytes, frame: Frame) -> FoundFrames:
     """The frames in bytes; those of a frame that has only begun are not consumed."""
     from inercal.foundation.records.frame_kernel import seek
 
@@ -84,17 +84,17 @@ def frames_in(data: bytes, frame: Frame) -> Found:
     count, consumed, damaged = seek(raw, *frame._sought, places)
     whole = raw[places[:count, None] + np.arange(frame.size)]
     rows = np.ascontiguousarray(whole).view(frame.dtype).reshape(count)
-    return Found(rows, int(consumed), int(consumed - count * frame.size), int(damaged))
+    return FoundFrames(rows, int(consumed), int(consumed - count * frame.size), int(damaged))
 
 
-class Turns(NamedTuple):
+class CounterTurns(NamedTuple):
     """The ``newest`` value of a counter that begins anew at 2^bits, as if it never did, -1 before the first; and how
     many before that are ``missing``."""
 
     newest: int = -1
     missing: int = 0
 
-    def on(self, values: NDArray[Any]) -> tuple[Turns, NDArray[np.int64]]:
+    def on(self, values: NDArray[Any]) -> tuple[CounterTurns, NDArray[np.int64]]:
         """After more values (n,) of an unsigned type: how the counter stands, and the values as if it never began
         anew. Each is within half the range of the newest before it, for one out of order may be wrong."""
         bits = 8 * values.dtype.itemsize
@@ -117,7 +117,7 @@ class Turns(NamedTuple):
         newest = np.maximum.accumulate(np.concatenate([[begin], numbers]))
         gained = np.diff(newest)
         missing = int(np.sum(gained[gained > 0] - 1)) - int(np.sum(numbers < newest[:-1]))
-        return Turns(int(newest[-1]), self.missing + missing), numbers
+        return CounterTurns(int(newest[-1]), self.missing + missing), numbers
 
 
 def _bytes(kind: str) -> int:

@@ -15,7 +15,7 @@ from inercal.foundation.records.channels import Origin, of_a_table
 from inercal.foundation.records.guessed_units import EVERYDAY, Guess, median, quoted, units_of
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.read import format_of
-from inercal.foundation.records.read.table import Sample
+from inercal.foundation.records.read.table import FirstLook
 from inercal.foundation.records.titles import (
     OF_A_MODEL,
     bare,
@@ -100,7 +100,7 @@ def columns_of(path: Path) -> tuple[Origin, ...]:
     )
 
 
-def _samples(path: Path) -> Sequence[Sample]:
+def _samples(path: Path) -> Sequence[FirstLook]:
     """The first look at the arrays of a file; raises `RecordError`."""
     try:
         return format_of(path).peek(path)
@@ -130,14 +130,14 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
 
 
-def _held(samples: Sequence[Sample]) -> str:
+def _held(samples: Sequence[FirstLook]) -> str:
     """The contents of a file in words."""
     return "; ".join(
         counted_names(sample.names, 8) or f"{sample.values.shape[1]} columns" for sample in samples
     )
 
 
-def _unused(samples: Sequence[Sample], files: Sequence[_File]) -> tuple[str, ...]:
+def _unused(samples: Sequence[FirstLook], files: Sequence[_File]) -> tuple[str, ...]:
     """The columns that are no channel: how a map names them, and how they begin."""
     used = [guess.origin for file in files for guess in file.guesses.values()]
     columns = []
@@ -168,7 +168,7 @@ def _skeleton(files: Sequence[_File], names: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _by_header(sample: Sample, on_table: bool, of_model: bool) -> list[Guess]:
+def _by_header(sample: FirstLook, on_table: bool, of_model: bool) -> list[Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
@@ -202,7 +202,7 @@ def _counted(guesses: list[Guess]) -> list[Guess]:
     return guesses
 
 
-def _by_norm(sample: Sample) -> list[Guess]:
+def _by_norm(sample: FirstLook) -> list[Guess]:
     """Sensors of names that say x, y, z and nothing known: the accelerometers are those whose norm is steadier."""
     units = [
         titled(*each)[1]
@@ -223,14 +223,14 @@ def _is_clock(values: Array) -> bool:
     return bool((step >= 0.0).all() and (step > 0.0).any())
 
 
-def _origin(sample: Sample, index: int) -> Origin:
+def _origin(sample: FirstLook, index: int) -> Origin:
     """The name of a column in a map."""
     if sample.names:
         return sample.names[index] if sample.names.count(sample.names[index]) == 1 else index
     return (sample.variable, index) if sample.variable else index
 
 
-def _by_shape(sample: Sample, path: Path) -> list[Guess]:
+def _by_shape(sample: FirstLook, path: Path) -> list[Guess]:
     """Channels of an array without a header: a time that rises, and one triad or two."""
     values = sample.values
 

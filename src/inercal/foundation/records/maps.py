@@ -16,7 +16,7 @@ from inercal.foundation.errors import InputError, MapError
 from inercal.foundation.records.channels import Channel, Origin, is_channel, misfit, nearest, needs_unit
 from inercal.foundation.records.checksums import CHECKS, NONE
 from inercal.foundation.records.frames import Frame
-from inercal.foundation.records.read.table import FileOptions, Part
+from inercal.foundation.records.read.table import FileOptions, FileShare
 from inercal.foundation.units import parse_quantity, parse_unit, shown
 
 
@@ -262,7 +262,7 @@ class RecordMap:
     """
 
     path: Path
-    parts: tuple[Part, ...]
+    parts: tuple[FileShare, ...]
     rate: float | None = None
     ignore_time: bool = False
     rate_u: float = 0.0
@@ -284,7 +284,7 @@ def read_map(path: str | Path) -> RecordMap:
     entry = check(MapEntry, data, path, MapError)
     if not entry.columns and not named:
         raise MapError(path, "columns: missing, expected at least one [columns.NAME] or [file.NAME]")
-    plain = (Part(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
+    plain = (FileShare(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
     rate, rate_u = _rate(entry.time, path)
     parts = (*plain, *(_part(name, named[name], path) for name in named))
     files = sorted({Path(part.path) for part in parts if part.name})
@@ -294,11 +294,11 @@ def read_map(path: str | Path) -> RecordMap:
     return RecordMap(Path(path), parts, rate, entry.time.ignore, rate_u)
 
 
-def _part(name: str, table: Mapping[str, Any], path: object) -> Part:
+def _part(name: str, table: Mapping[str, Any], path: object) -> FileShare:
     """One ``[file.NAME]``."""
     where = f"{path}: file.{name}"
     entry = check(NamedFileEntry, table, where, MapError)
-    return Part(_channels(entry.columns, where), _options(entry), name, entry.path)
+    return FileShare(_channels(entry.columns, where), _options(entry), name, entry.path)
 
 
 def _options(entry: FileEntry) -> FileOptions:

@@ -19,7 +19,7 @@ from inercal.foundation.records.places import counted_names
 from inercal.foundation.results.budget import BudgetItem
 
 
-class Goal(TypedDict):
+class ReachedGoal(TypedDict):
     """A goal of a study, as results have it: ``wanted`` and reached ``u`` [SI], and whether it is ``met``."""
 
     wanted: float
@@ -40,7 +40,7 @@ def at_prior_together(names: Sequence[str], more: str = "") -> list[Finding]:
     return [Finding("at_prior", f"{counted_names(names, 6)}: more than half of the prior is left{more}")]
 
 
-def reached(names: Sequence[str], u: Array, wanted: Mapping[str, float]) -> dict[str, Goal]:
+def reached(names: Sequence[str], u: Array, wanted: Mapping[str, float]) -> dict[str, ReachedGoal]:
     """The goals ``wanted`` [SI] of coefficients that there are, by their ``u`` (p,)."""
     return {
         name: {"wanted": wanted[name], "u": size, "met": size <= wanted[name]}
@@ -50,7 +50,7 @@ def reached(names: Sequence[str], u: Array, wanted: Mapping[str, float]) -> dict
 
 
 def missed(
-    goals: Mapping[str, Goal], units: Mapping[str, str], hints: Mapping[str, str] | None = None
+    goals: Mapping[str, ReachedGoal], units: Mapping[str, str], hints: Mapping[str, str] | None = None
 ) -> list[Finding]:
     """A finding for each goal that was not met; ``units`` SI unit by name."""
     texts = {}

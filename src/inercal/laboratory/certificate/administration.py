@@ -12,7 +12,7 @@ from inercal.laboratory.certificate.elements import dcc, optional, plain, words
 if TYPE_CHECKING:
     from lxml.etree import _Element
 
-    from inercal.faces.studies.laboratory import PlaceTable
+    from inercal.faces.studies.laboratory import AddressTable
     from inercal.laboratory.certificate.lab import LabFile
 
 GENERAL = (
@@ -145,7 +145,7 @@ def _items(lab: LabFile) -> _Element:
     )
 
 
-def _contact(name: str, place: PlaceTable) -> _Element:
+def _contact(name: str, place: AddressTable) -> _Element:
     """Name and address of a company."""
     location = dcc(
         "location",

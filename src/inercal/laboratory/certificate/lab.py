@@ -14,13 +14,13 @@ from inercal.faces.studies.commented import commented
 from inercal.faces.studies.common import Conditions, ConditionsTable
 from inercal.faces.studies.fields import refusal
 from inercal.faces.studies.laboratory import (
+    AddressTable,
     Day,
     Equipment,
     EquipmentTable,
     Item,
     ItemTable,
     LaboratoryTable,
-    PlaceTable,
     Tolerances,
 )
 from inercal.faces.studies.load import put
@@ -91,7 +91,7 @@ class LabFile(Strict):
     laboratory: LaboratoryTable = Field(
         default=LaboratoryTable(), title="Laboratory", description="who calibrates"
     )
-    customer: PlaceTable = Field(default=PlaceTable(), title="Customer", description="for whom")
+    customer: AddressTable = Field(default=AddressTable(), title="Customer", description="for whom")
     order: OrderTable = Field(default=OrderTable(), title="Order", description="the order, and its days")
     item: Item = ItemTable()
     conditions: Conditions = ConditionsTable()

@@ -13,7 +13,13 @@ from inercal.foundation.instruments.dsi import dsi
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.shown import rounded
 from inercal.laboratory.certificate.elements import NAMESPACES
-from inercal.laboratory.certificate.reading import Certificate, Quantity, quantities_in, quantities_of, text
+from inercal.laboratory.certificate.reading import (
+    Certificate,
+    CertifiedValue,
+    quantities_in,
+    quantities_of,
+    text,
+)
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -215,7 +221,7 @@ def _limits(element: _Element) -> str:
     return f"{verdict}: {' to '.join(values)}" if values else verdict
 
 
-def _row(quantity: Quantity, name: str = "", limits: str = "") -> _Row:
+def _row(quantity: CertifiedValue, name: str = "", limits: str = "") -> _Row:
     """A number rounded by its uncertainty, and the same in the unit of the field."""
     words = (name or quantity.name).removeprefix(f"{quantity.label}: ")
     value, U = _rounded(quantity.value, quantity.U, quantity.k)
@@ -232,7 +238,7 @@ def _rounded(value: float, U: float, k: float) -> tuple[str, str]:
     return shown, expanded
 
 
-def _in_field(quantity: Quantity) -> str:
+def _in_field(quantity: CertifiedValue) -> str:
     """Value and U in deg/h, ug, arcsec, ppm, ...; empty where the unit is that already, or a scale factor near 1."""
     try:
         coherent = dsi(quantity.unit)[1] == 1.0 and "count" not in quantity.unit

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Quantity:
+class CertifiedValue:
     """One number of a certificate: ``value`` and ``U`` in ``unit``, as inercal writes units; ``k`` and ``probability``.
 
     ``U``, ``k`` and ``probability`` are NaN where none is stated.
@@ -65,7 +65,7 @@ class Measured:
     """One measurement result: its quantities, its region, and the result of inercal where that is inside."""
 
     name: str
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[CertifiedValue, ...]
     region: Region | None
     estimate: Estimate | None
 
@@ -146,7 +146,7 @@ def _item(root: _Element) -> str:
 def _measured(element: _Element, path: str | Path) -> Measured:
     """The measurement result of an element."""
     region = None
-    quantities: list[Quantity] = []
+    quantities: list[CertifiedValue] = []
     for each in quantities_of(element.iterfind("dcc:results/dcc:result", NAMESPACES)):
         if f"{PREFIX}covariance" in each.get("refType", "").split():
             region = _region(each)
@@ -173,7 +173,7 @@ def quantities_of(results: Iterable[_Element]) -> Iterator[_Element]:
                 yield found
 
 
-def quantities_in(element: _Element, last: bool | None = None) -> Iterator[Quantity]:
+def quantities_in(element: _Element, last: bool | None = None) -> Iterator[CertifiedValue]:
     """The numbers of a quantity, each in one unit: where several are stated the ``last`` one, or the first.
 
     None: the last of ours, which is that of the result, and the first of others, which is that of D-SI.
@@ -191,7 +191,7 @@ def quantities_in(element: _Element, last: bool | None = None) -> Iterator[Quant
         yield from _list(lists[-1 if last else 0], name, kinds)
 
 
-def _real(element: _Element, name: str, kinds: tuple[str, ...]) -> Quantity:
+def _real(element: _Element, name: str, kinds: tuple[str, ...]) -> CertifiedValue:
     """A number with its expanded uncertainty."""
     stated = (
         _number(element, f"si:expandedUnc/si:{key}")
@@ -200,7 +200,7 @@ def _real(element: _Element, name: str, kinds: tuple[str, ...]) -> Quantity:
     U, k, probability = stated
     value = _number(element, "si:value")
     unit = from_dsi(text(element, "si:unit"))
-    return Quantity(name, text(element, "si:label"), kinds, value, U, k, probability, unit)
+    return CertifiedValue(name, text(element, "si:label"), kinds, value, U, k, probability, unit)
 
 
 def _number(element: _Element, path: str) -> float:
@@ -209,7 +209,7 @@ def _number(element: _Element, path: str) -> float:
     return float(found) if found else math.nan
 
 
-def _list(element: _Element, name: str, kinds: tuple[str, ...]) -> Iterator[Quantity]:
+def _list(element: _Element, name: str, kinds: tuple[str, ...]) -> Iterator[CertifiedValue]:
     """The numbers of a list; what is stated once is of all."""
     values = [float(each) for each in text(element, "si:valueXMLList").split()]
     count = len(values)
@@ -225,7 +225,7 @@ def _list(element: _Element, name: str, kinds: tuple[str, ...]) -> Iterator[Quan
     )
     for i, value in enumerate(values):
         label = labels[i] if len(labels) == count else ""
-        yield Quantity(name, label, kinds, value, U[i], k[i], probability[i], units[i])
+        yield CertifiedValue(name, label, kinds, value, U[i], k[i], probability[i], units[i])
 
 
 def _spread(stated: list[T], count: int, absent: T) -> list[T]:
@@ -265,7 +265,7 @@ def _inside(element: _Element, path: str | Path) -> Estimate | None:
     return None
 
 
-def _consistent(quantities: Sequence[Quantity], region: Region) -> bool:
+def _consistent(quantities: Sequence[CertifiedValue], region: Region) -> bool:
     """True if the covariance element repeats the same numbers."""
     stated = {each.label: (each.value, each.U) for each in quantities if each.label}
     there = zip(region.names, region.values.tolist(), region.U.tolist(), strict=True)
@@ -312,7 +312,7 @@ def estimate_of_certificate(path: str | Path) -> Estimate:
 def _of_numbers(found: Certificate, path: str | Path) -> Estimate:
     """An estimate of all numbers with an uncertainty."""
     names: list[str] = []
-    stated: list[Quantity] = []
+    stated: list[CertifiedValue] = []
     blocks: list[Array] = []
     for each in found.results:
         known = [q for q in each.quantities if math.isfinite(q.U) and q.k > 0.0]

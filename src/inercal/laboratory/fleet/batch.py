@@ -27,13 +27,13 @@ from inercal.foundation.results.basis import Basis, provenance
 from inercal.foundation.results.files import save
 from inercal.foundation.results.result import Estimate
 from inercal.laboratory.fleet.fleet import Fleet, fleet_of
-from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.manifest import FleetUnit, read_manifest
 from inercal.laboratory.fleet.page import page, pictures, result_of, summary, table
-from inercal.laboratory.fleet.unit import FAILED, Batch, Row, content_of
+from inercal.laboratory.fleet.unit import FAILED, Batch, UnitRow, content_of
 from inercal.laboratory.specification import specification_of
 
 
-def columns(rows: Sequence[Row]) -> dict[str, list[Any]]:
+def columns(rows: Sequence[UnitRow]) -> dict[str, list[Any]]:
     """Columns by title: verdict, each coefficient with its U in one unit of measurement, times, SHA-256 of the inputs.
 
     A unit without a coefficient, or with it in another unit of measurement, has None there.
@@ -66,7 +66,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def as_csv(rows: Sequence[Row]) -> str:
+def as_csv(rows: Sequence[UnitRow]) -> str:
     """The table as CSV: numbers in full, empty cells where there are none."""
     found = columns(rows)
     out = io.StringIO()
@@ -79,7 +79,7 @@ def as_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def write_parquet(rows: Sequence[Row], path: Path) -> None:
+def write_parquet(rows: Sequence[UnitRow], path: Path) -> None:
     """Write the table as Parquet; raises `MissingExtraError` without pyarrow."""
     try:
         import pyarrow
@@ -199,7 +199,7 @@ _NAMES = ("units.csv", "units.parquet", "fleet.html", "fleet.json")
 """Files of a fleet in its folder, beside those of the units."""
 
 
-def _spare(folder: Path, manifest: Path, units: Sequence[Unit], others: Iterable[Path]) -> None:
+def _spare(folder: Path, manifest: Path, units: Sequence[FleetUnit], others: Iterable[Path]) -> None:
     """Refuse a folder where the outcome would take the place of an input, or be taken for recordings."""
     if manifest.is_dir() and Path(realpath(folder)).is_relative_to(realpath(manifest)):
         raise InputError(folder, f"lies in {manifest}, whose files are recordings, expected another folder")
@@ -221,10 +221,10 @@ def _make(folder: Path) -> None:
 
 
 def _rows(
-    work: Batch, units: Sequence[Unit], executor: Executor, workers: int, progress: Progress
-) -> list[Row]:
+    work: Batch, units: Sequence[FleetUnit], executor: Executor, workers: int, progress: Progress
+) -> list[UnitRow]:
     """The row of each unit; one whose process ended by itself says so, and the others are done all the same."""
-    done: dict[int, Row] = {}
+    done: dict[int, UnitRow] = {}
     progress(0, len(units))
 
     size = max(1, min(_AT_ONCE, len(units) // (32 * workers))) if isinstance(executor, Cluster) else 1
@@ -260,9 +260,9 @@ def _chunks(numbers: Sequence[int], size: int) -> list[range]:
     return chunks
 
 
-def _ended(work: Batch, unit: Unit) -> Row:
+def _ended(work: Batch, unit: FleetUnit) -> UnitRow:
     """The row of a unit whose process ended."""
-    row = Row(unit.serial, FAILED, "its process was ended, perhaps for want of memory")
+    row = UnitRow(unit.serial, FAILED, "its process was ended, perhaps for want of memory")
     work.write(row)
     return row
 

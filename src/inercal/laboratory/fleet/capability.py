@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.laboratory.fleet.unit import Row
+from inercal.laboratory.fleet.unit import UnitRow
 from inercal.laboratory.specification import Specification
 
 LEVEL = 0.95
@@ -105,7 +105,7 @@ class Spread:
         return float(theilslopes(self.values, x)[0]), float(kendalltau(x, self.values).pvalue)
 
 
-def spreads(rows: Sequence[Row], specification: Specification) -> tuple[Spread, ...]:
+def spreads(rows: Sequence[UnitRow], specification: Specification) -> tuple[Spread, ...]:
     """Every coefficient of the units that ended `ok`, in the unit of measurement of the first unit that has it."""
     found: dict[str, list[tuple[int, int]]] = {}
     for i, row in enumerate(rows):
@@ -116,7 +116,7 @@ def spreads(rows: Sequence[Row], specification: Specification) -> tuple[Spread, 
 
 
 def _spread(
-    name: str, places: Sequence[tuple[int, int]], rows: Sequence[Row], specification: Specification
+    name: str, places: Sequence[tuple[int, int]], rows: Sequence[UnitRow], specification: Specification
 ) -> Spread:
     """The spread of one coefficient over the fleet."""
     every = [rows[i].coefficients[j] for i, j in places]

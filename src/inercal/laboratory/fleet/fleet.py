@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.laboratory.fleet.capability import Share, Spread, spreads
-from inercal.laboratory.fleet.unit import FAILED, REFUSED, Row
+from inercal.laboratory.fleet.unit import FAILED, REFUSED, UnitRow
 from inercal.laboratory.specification import Specification
 
 RISK = 0.05
@@ -143,7 +143,7 @@ class Fleet:
     have, NaN of too few units.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[UnitRow, ...]
     good: Share
     twins: tuple[tuple[int, str], ...]
     spreads: tuple[Spread, ...]
@@ -197,7 +197,7 @@ class Fleet:
             )
 
 
-def fleet_of(rows: Sequence[Row], specification: Specification) -> Fleet:
+def fleet_of(rows: Sequence[UnitRow], specification: Specification) -> Fleet:
     """The fleet of rows in the order of the manifest."""
     found = spreads(rows, specification)
     twins = _twins(rows)
@@ -212,7 +212,7 @@ def fleet_of(rows: Sequence[Row], specification: Specification) -> Fleet:
     return Fleet(tuple(rows), share, twins, found, at, per, _trends(found, at), strange, farthest)
 
 
-def _twins(rows: Sequence[Row]) -> tuple[tuple[int, str], ...]:
+def _twins(rows: Sequence[UnitRow]) -> tuple[tuple[int, str], ...]:
     """Places of units with the same recordings as another, and the serial number of that one."""
     same: dict[tuple[str, ...], list[int]] = {}
     for i, row in enumerate(rows):
@@ -227,7 +227,7 @@ def _twins(rows: Sequence[Row]) -> tuple[tuple[int, str], ...]:
     return tuple(sorted(pairs))
 
 
-def _times(rows: Sequence[Row]) -> tuple[Array, str]:
+def _times(rows: Sequence[UnitRow]) -> tuple[Array, str]:
     """Times at which the units were measured [days], where all say so on more than one day; else their numbers."""
     try:
         days = np.array([float(date.fromisoformat(row.measured).toordinal()) for row in rows])

@@ -22,7 +22,7 @@ _KEY = re.compile(r"[A-Za-z_][\w-]*(\.[\w-]+)*")
 
 
 @dataclass(frozen=True)
-class Unit:
+class FleetUnit:
     """A unit: its ``serial`` number, its ``files`` (paths or URLs), and its own ``keys`` of the study as ``--set``
     takes them."""
 
@@ -44,7 +44,7 @@ class Unit:
         return (f"item.serial={json.dumps(self.serial)}", *self.keys)
 
 
-def read_manifest(path: str | Path) -> tuple[Unit, ...]:
+def read_manifest(path: str | Path) -> tuple[FleetUnit, ...]:
     """The units of a manifest, in its order.
 
     Parameters
@@ -68,7 +68,7 @@ def read_manifest(path: str | Path) -> tuple[Unit, ...]:
     units = list(_of_folder(path) if path.is_dir() else _of_rows(path))
     if not units:
         raise InputError(path, f"holds no unit, {_EXPECTED}")
-    first: dict[str, Unit] = {}
+    first: dict[str, FleetUnit] = {}
     for unit in units:
         if unit.serial in first:
             raise InputError(
@@ -78,15 +78,15 @@ def read_manifest(path: str | Path) -> tuple[Unit, ...]:
     return tuple(units)
 
 
-def _of_folder(folder: Path) -> Iterator[Unit]:
+def _of_folder(folder: Path) -> Iterator[FleetUnit]:
     """Each recording of a folder, and each folder of recordings in it."""
     for each in sorted(folder.iterdir()):
         if each.is_dir():
             files = sorted(inner for inner in each.iterdir() if _is_recording(inner))
             if files:
-                yield Unit(each.name, tuple(map(str, files)))
+                yield FleetUnit(each.name, tuple(map(str, files)))
         elif _is_recording(each):
-            yield Unit(each.name[: -len(_suffix(each))], (str(each),))
+            yield FleetUnit(each.name[: -len(_suffix(each))], (str(each),))
 
 
 def _suffix(path: Path) -> str:
@@ -99,7 +99,7 @@ def _is_recording(path: Path) -> bool:
     return path.is_file() and not path.name.startswith(".") and len(_suffix(path)) not in (0, len(path.name))
 
 
-def _of_rows(path: Path) -> Iterator[Unit]:
+def _of_rows(path: Path) -> Iterator[FleetUnit]:
     """Each row of a manifest."""
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -132,7 +132,7 @@ def _check_head(head: list[str], path: Path) -> None:
             )
 
 
-def _of_row(head: list[str], cells: list[str], path: Path, line: int) -> Unit:
+def _of_row(head: list[str], cells: list[str], path: Path, line: int) -> FleetUnit:
     """The unit of a row."""
     if len(cells) != len(head):
         raise InputError(
@@ -156,4 +156,4 @@ def _of_row(head: list[str], cells: list[str], path: Path, line: int) -> Unit:
             path, f"line {line}, column files: found an empty name, expected files divided by ';'"
         )
     places = tuple(name if "://" in name else str(path.parent / name) for name in files)
-    return Unit(serial, places, tuple(f"{key}={value}" for key, value in row.items() if value))
+    return FleetUnit(serial, places, tuple(f"{key}={value}" for key, value in row.items() if value))

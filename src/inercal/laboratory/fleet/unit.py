@@ -26,7 +26,7 @@ from inercal.foundation.errors import InercalError, InputError, MissingExtraErro
 from inercal.foundation.inputs import program
 from inercal.foundation.results.files import plain_objects, save
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.fleet.manifest import Unit, read_manifest
+from inercal.laboratory.fleet.manifest import FleetUnit, read_manifest
 from inercal.laboratory.specification import Specification, judged, specification_of
 
 REFUSED = "refused"
@@ -49,7 +49,7 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
-class Row:
+class UnitRow:
     """The row of a unit: verdict, codes of the findings, coefficients, and the SHA-256 of its ``inputs`` by name.
 
     Coefficients ``outside`` their limits, and names of limits ``without_value``, which no coefficient has.
@@ -87,7 +87,7 @@ class Batch:
     overrides: tuple[str, ...] = ()
     store: str | None = field(default=None, repr=False)
 
-    def __call__(self, numbers: Iterable[int]) -> list[tuple[int, Row]]:
+    def __call__(self, numbers: Iterable[int]) -> list[tuple[int, UnitRow]]:
         """Do the units with these numbers that are not done, and give the rows of all."""
         units = _units(self.manifest, self.content)
         return [(number, self._row(units[number])) for number in numbers]
@@ -98,7 +98,7 @@ class Batch:
         if study.system.prepare:
             study.system.prepare(study, False)
 
-    def _row(self, unit: Unit) -> Row:
+    def _row(self, unit: FleetUnit) -> UnitRow:
         """The row of a unit, by a new calibration where it must be."""
         paths: Sequence[str] = ()
         try:
@@ -111,17 +111,17 @@ class Batch:
                 row = self._calibrated(unit, paths, inputs)
                 return self.write(row if row.status == FAILED else replace(row, key=key))
         except (OSError, InercalError) as error:
-            return self.write(Row(unit.serial, REFUSED, _sentence(error, unit, paths)))
+            return self.write(UnitRow(unit.serial, REFUSED, _sentence(error, unit, paths)))
 
-    def study_of(self, unit: Unit) -> Study:
+    def study_of(self, unit: FleetUnit) -> Study:
         """The study of a unit; raises `InputError`."""
         return read_study(kind_of(self.study), self.study, (*self.overrides, *unit.overrides))
 
-    def _whole(self, row: Row) -> bool:
+    def _whole(self, row: UnitRow) -> bool:
         """True if the result of a row is there."""
         return row.status in (REFUSED, FAILED) or result_path(self.folder, row.serial).is_file()
 
-    def _key(self, unit: Unit, inputs: Mapping[str, str]) -> str:
+    def _key(self, unit: FleetUnit, inputs: Mapping[str, str]) -> str:
         """SHA-256 of all that the row of a unit rests on."""
         study = self.study_of(unit)
         files = {str(path): _sha256(path) for path in (*study.files, *([self.map] if self.map else []))}
@@ -129,7 +129,7 @@ class Batch:
         parts = [program(), unit.serial, self.overrides, unit.overrides, inputs, files, store]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
-    def _calibrated(self, unit: Unit, paths: Sequence[str], inputs: Mapping[str, str]) -> Row:
+    def _calibrated(self, unit: FleetUnit, paths: Sequence[str], inputs: Mapping[str, str]) -> UnitRow:
         """The row of a unit by a calibration, its result written and kept; raises `InputError` where it cannot be."""
         begun, names = datetime.now(UTC), dict(zip(paths, unit.names, strict=True))
         try:
@@ -139,9 +139,9 @@ class Batch:
                 unit.serial, estimate, specification_of(study.keys.get("specification", {}), self.study)
             )
         except InercalError as error:
-            row = Row(unit.serial, REFUSED, _sentence(error, unit, paths))
+            row = UnitRow(unit.serial, REFUSED, _sentence(error, unit, paths))
         except Exception as error:  # a row that says why; the other units go on
-            row = Row(unit.serial, FAILED, without_secrets(f"{type(error).__name__}: {error}"))
+            row = UnitRow(unit.serial, FAILED, without_secrets(f"{type(error).__name__}: {error}"))
         else:
             save(estimate, result_path(self.folder, unit.serial))
             if self.store is not None:
@@ -154,7 +154,7 @@ class Batch:
             seconds=round((ended - begun).total_seconds(), 3),
         )
 
-    def write(self, row: Row) -> Row:
+    def write(self, row: UnitRow) -> UnitRow:
         """Write a row, and give it back; a result of before does not stay beside one without any."""
         if row.status in (REFUSED, FAILED):
             result_path(self.folder, row.serial).unlink(missing_ok=True)
@@ -172,13 +172,13 @@ def result_path(folder: Path, serial: str) -> Path:
     return folder / "results" / f"{quote(serial, safe=' ')}.json"
 
 
-def row_of(folder: Path, serial: str) -> Row | None:
+def row_of(folder: Path, serial: str) -> UnitRow | None:
     """The row that was written of a unit; None where there is none that can be read."""
     try:
         data = json.loads(row_path(folder, serial).read_bytes())
         coefficients = tuple(map(_coefficient, data.pop("coefficients")))
         texts = {key: tuple(data[key]) for key in ("findings", "outside", "without_value")}
-        return Row(**{**data, **texts, "coefficients": coefficients})
+        return UnitRow(**{**data, **texts, "coefficients": coefficients})
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
@@ -191,7 +191,7 @@ def _coefficient(given: dict[str, Any]) -> Coefficient:
 
 
 @cache
-def _units(manifest: Path, content: str) -> tuple[Unit, ...]:
+def _units(manifest: Path, content: str) -> tuple[FleetUnit, ...]:
     """The units of a manifest, read once in a process; raises `InputError` where they are others by now."""
     units = read_manifest(manifest)
     if content_of(units) != content:
@@ -199,7 +199,7 @@ def _units(manifest: Path, content: str) -> tuple[Unit, ...]:
     return units
 
 
-def content_of(units: Sequence[Unit]) -> str:
+def content_of(units: Sequence[FleetUnit]) -> str:
     """SHA-256 of what a manifest says."""
     return hashlib.sha256(json.dumps([[u.serial, u.files, u.keys] for u in units]).encode()).hexdigest()
 
@@ -212,11 +212,11 @@ def _calibration(study: Study, paths: Sequence[str], map: Path | None) -> Estima
     return calibrate(repeats(paths, study, map), study).estimate
 
 
-def _row(serial: str, estimate: Estimate, specification: Specification) -> Row:
+def _row(serial: str, estimate: Estimate, specification: Specification) -> UnitRow:
     """The row of a result, judged."""
     shown = estimate.shown()
     verdicts = judged(estimate, specification)
-    return Row(
+    return UnitRow(
         serial,
         estimate.status.value,
         estimate.message,
@@ -278,7 +278,7 @@ def _sha256(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _sentence(error: Exception, unit: Unit, paths: Sequence[str]) -> str:
+def _sentence(error: Exception, unit: FleetUnit, paths: Sequence[str]) -> str:
     """The sentence of an error, in the names of the manifest."""
     text = (
         f"{error.filename}: cannot be read ({error.strerror})" if isinstance(error, OSError) else str(error)

@@ -2,11 +2,11 @@
 
 from alembic import context
 
-from inercal.laboratory.tables import Base
+from inercal.laboratory.tables import Tables
 
 context.configure(
     connection=context.config.attributes["connection"],
-    target_metadata=Base.metadata,
+    target_metadata=Tables.metadata,
     transaction_per_migration=False,
 )
 context.run_migrations()

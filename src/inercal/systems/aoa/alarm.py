@@ -14,7 +14,7 @@ _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
 
 
 @dataclass(frozen=True)
-class Alarm:
+class AlarmLimits:
     """Limits of the angle of attack, or of pitch where the study does not state how the model lies in the stream."""
 
     lowest: float | None = quantity(

@@ -27,7 +27,7 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.shown import Table, heads, short
 from inercal.foundation.units import STANDARD_GRAVITY
-from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
+from inercal.systems.aoa.fusion.filter_result import FusionResult, estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.layout import AXES, STATED, Layout, axes, tangential_arms
 from inercal.systems.aoa.limits import LIMITS
@@ -79,7 +79,7 @@ class Bound:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparedLayouts:
     """The ``bounds`` of layouts side by side, that under [sensors] first."""
 
     bounds: tuple[Bound, ...]
@@ -119,7 +119,7 @@ class Compared:
         ]
 
 
-def compare(settings: AoaSettings, progress: Callable[[str], None] = lambda _: None) -> Compared:
+def compare(settings: AoaSettings, progress: Callable[[str], None] = lambda _: None) -> ComparedLayouts:
     """The bounds of the layout that the study states, and of those beside it; raises `StudyError` without a motion."""
     if settings.motion is None:
         raise StudyError("motion", "missing, expected the motion to judge the layouts by")
@@ -153,7 +153,7 @@ def compare(settings: AoaSettings, progress: Callable[[str], None] = lambda _: N
             for bound in bounds
         ],
     }
-    return Compared(tuple(bounds), message, result, findings)
+    return ComparedLayouts(tuple(bounds), message, result, findings)
 
 
 def _bound(settings: AoaSettings, name: str, layout: Layout, states: tuple[Array, Array, Array]) -> Bound:
@@ -216,14 +216,14 @@ def settled_u(settings: AoaSettings, layout: Layout, recording: Recording) -> fl
     return _settled(_fused(settings, layout, recording), recording)
 
 
-def _fused(settings: AoaSettings, layout: Layout, recording: Recording) -> FilterResult:
+def _fused(settings: AoaSettings, layout: Layout, recording: Recording) -> FusionResult:
     """The fusion along a recording without noise."""
     # a bound holds nothing back
     of = replace(settings, layout=layout, estimator=replace(settings.estimator, gate=math.inf))
     return estimate(recording, problem(of), settings.estimator.smooth)
 
 
-def _settled(filtered: FilterResult, recording: Recording) -> float:
+def _settled(filtered: FusionResult, recording: Recording) -> float:
     """Rms u [rad] of the angle after the fusion settled; inf where it has none."""
     u = filtered.u[(recording.t >= LIMITS.settling_time) & np.isfinite(filtered.u)]
     return math.sqrt(float(np.mean(np.square(u)))) if len(u) else math.inf

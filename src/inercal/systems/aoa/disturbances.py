@@ -44,7 +44,7 @@ class Oscillation:
 
 
 @dataclass(frozen=True)
-class Line:
+class VibrationLine:
     """A line of the tunnel's vibration: a sine of random phase that shakes the whole model along z and x."""
 
     frequency: float = quantity("of the line", "frequency", REQUIRED, example="112 Hz", bounds=FREQUENCY)
@@ -90,7 +90,7 @@ class Disturbances:
     yaw: Oscillation | None = None
     buffet: AngleShaking | None = None
     plunge: Plunge | None = None
-    lines: tuple[Line, ...] = ()
+    lines: tuple[VibrationLine, ...] = ()
     local_vibration: Shaking | None = None
     mains: Mains | None = None
     pivot: float = quantity("added to all positions r", "length", "0 m", example="3 mm", bounds=_SHIFT)

@@ -17,8 +17,8 @@ from inercal.systems.aoa.diagnosis.unseen import unseen
 from inercal.systems.aoa.estimators import EstimatorKind
 from inercal.systems.aoa.fusion import filter_result, live_band, smoother
 from inercal.systems.aoa.fusion.band import fused_case
-from inercal.systems.aoa.fusion.filter_result import FilterResult, fusion_label
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.fusion.filter_result import FusionResult, fusion_label
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
 from inercal.systems.aoa.paper.delay import Delay
 from inercal.systems.aoa.paper.methods import MEASURED, label
 from inercal.systems.aoa.reading.recording import Recording
@@ -29,7 +29,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class PreparedRecording:
     """A recording to be measured: as read, and ``zeroed`` by the study's zero.
 
     ``settings`` are those of the study with what the recording decides; ``problem`` is that of the fusion, ``delay``
@@ -39,18 +39,18 @@ class Case:
     recording: Recording
     zeroed: Recording
     settings: AoaSettings
-    problem: FilterProblem
+    problem: FusionProblem
     delay: Delay | None
     findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class MeasuredAngles:
     """The ``angles`` of a case, further ``findings``, and errors of the sensors as ``filtered``, None without them."""
 
     angles: Angles
     findings: tuple[Finding, ...] = ()
-    filtered: FilterResult | None = None
+    filtered: FusionResult | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class AngleEstimator:
     """
 
     name: Callable[[AoaSettings], str]
-    estimate: Callable[[Case, Progress], Found]
+    estimate: Callable[[PreparedRecording, Progress], MeasuredAngles]
     angles: Callable[[Recording, AoaSettings], Angles]
     beside: Callable[[AoaSettings], Sequence[AoaSettings]]
     load_kernels: Callable[[AoaSettings], None]
@@ -74,7 +74,7 @@ def estimator_of(settings: AoaSettings) -> AngleEstimator:
     return ESTIMATORS[settings.estimator.kind]
 
 
-def _fusion(case: Case, progress: Progress) -> Found:
+def _fusion(case: PreparedRecording, progress: Progress) -> MeasuredAngles:
     """The angles by the fusion, and all that it says of the recording."""
     zeroed, settings, of = case.zeroed, case.settings, case.problem
     progress("smoothing" if settings.estimator.smooth else "filtering")
@@ -89,7 +89,7 @@ def _fusion(case: Case, progress: Progress) -> Found:
     known_u = angles.u[np.isfinite(angles.u)]
     if len(known_u):
         findings += of_rectification(case.recording, settings, float(np.median(known_u)))
-    return Found(angles, tuple(findings), filtered)
+    return MeasuredAngles(angles, tuple(findings), filtered)
 
 
 def _fusion_alone(recording: Recording, settings: AoaSettings) -> Angles:
@@ -120,10 +120,10 @@ def _kernels_of_fusion(settings: AoaSettings) -> None:
         smoother.load_kernels(of)
 
 
-def _by_paper(case: Case, progress: Progress) -> Found:
+def _by_paper(case: PreparedRecording, progress: Progress) -> MeasuredAngles:
     """The angles by the paper's methods."""
     progress(label(case.settings.methods))
-    return Found(by_methods(case.recording, case.settings, case.settings.methods))
+    return MeasuredAngles(by_methods(case.recording, case.settings, case.settings.methods))
 
 
 def _papers(settings: AoaSettings) -> list[AoaSettings]:

@@ -24,7 +24,7 @@ from inercal.foundation.keys import (
     within,
 )
 from inercal.foundation.units import STANDARD_GRAVITY, Quantity
-from inercal.systems.aoa.alarm import Alarm
+from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.disturbances import SIZE, Disturbances
 from inercal.systems.aoa.estimators import WORDS, Centrifugal, EstimatorKind, States, Static, Tangential
@@ -114,7 +114,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class SensorCalibration:
     """A sensor's calibration: it measures ``indication x scale - bias``, both with temperature terms.
 
     ``scale`` SI per SI unit of the record's column, or ``per`` volt or count of it; ``bias`` [SI]; ``scale_slope``
@@ -357,7 +357,7 @@ class AoaSettings:
     layout: Layout
     noise: Noise
     prior: Prior = field(default_factory=Prior)
-    sensors: Mapping[str, Calibration] = field(default_factory=dict)
+    sensors: Mapping[str, SensorCalibration] = field(default_factory=dict)
     timing: Timing = field(default_factory=Timing)
     band: Band = field(default_factory=Band)
     estimator: Estimator = field(default_factory=Estimator)
@@ -365,7 +365,7 @@ class AoaSettings:
     attitude: Attitude = field(default_factory=Attitude)
     zero: Zero | None = None
     points: PointPlan = field(default_factory=PointPlan)
-    alarm: Alarm = field(default_factory=Alarm)
+    alarm: AlarmLimits = field(default_factory=AlarmLimits)
     motion: MotionPlan | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     layouts: Mapping[str, Layout] = field(default_factory=dict)
@@ -375,6 +375,6 @@ class AoaSettings:
     given: Mapping[str, Any] = field(default_factory=dict)
     corrections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    def calibration(self, name: str) -> Calibration:
+    def calibration(self, name: str) -> SensorCalibration:
         """The calibration of a sensor; the identity where the study has none."""
-        return self.sensors.get(name, Calibration())
+        return self.sensors.get(name, SensorCalibration())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.systems.contract import Channels, Design, Plan, System
+from inercal.systems.contract import Channels, OfferedDesign, OfferedPlan, System
 
 if TYPE_CHECKING:
     import numpy as np
@@ -163,13 +163,13 @@ SYSTEM = System(
     compares=True,
     simulate=_simulate,
     runs=_runs,
-    designs={"aoa": Design(_design, _prepare_design)},
+    designs={"aoa": OfferedDesign(_design, _prepare_design)},
     stream=_stream,
     streams="angle",
     loaded=_loaded,
     foresight=_foresight,
     verticals=_verticals,
-    plan=Plan("aoa", "", _LINE, _rows, keys=_sensors),
+    plan=OfferedPlan("aoa", "", _LINE, _rows, keys=_sensors),
     cases=_cases,
     shows="angle of attack",
 )

@@ -16,10 +16,10 @@ from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.diagnosis.choice import decided_with, of_vibration
 from inercal.systems.aoa.diagnosis.examination import implausible
-from inercal.systems.aoa.estimation import ESTIMATORS, Case, estimator_of
+from inercal.systems.aoa.estimation import ESTIMATORS, PreparedRecording, estimator_of
 from inercal.systems.aoa.fusion.band import fused_case
-from inercal.systems.aoa.fusion.filter_result import FilterResult
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.fusion.filter_result import FusionResult
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
 from inercal.systems.aoa.paper.methods import MEASURED, label, low_passed
 from inercal.systems.aoa.reading.from_record import recording_of
@@ -49,10 +49,10 @@ class Measurement:
 
     estimate: Estimate
     settings: AoaSettings
-    problem: FilterProblem
+    problem: FusionProblem
     recording: Recording
     angles: Angles
-    filtered: FilterResult | None
+    filtered: FusionResult | None
     points: tuple[Point, ...]
     delay: Delay | None
     errors: Mapping[str, Errors] = field(default_factory=dict)
@@ -125,7 +125,7 @@ def measure(
     zeroed = recording if settings.zero is None else with_zero(recording, settings)
     of = problem(settings, recording.spatial, posterior if known is None else known)
     found = estimator_of(settings).estimate(
-        Case(recording, zeroed, settings, of, delay, tuple(findings)), progress
+        PreparedRecording(recording, zeroed, settings, of, delay, tuple(findings)), progress
     )
     angles, filtered = found.angles, found.filtered
     compared = _compared(zeroed, settings, angles, progress) if compare else {}

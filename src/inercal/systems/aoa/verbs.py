@@ -158,7 +158,7 @@ def prepare_design(study: Study) -> None:
 def design(study: Study, progress: Progress = lambda _: None) -> Result:
     """Say what the stated layout of the sensors, and those beside it, can tell of the angle.
 
-    ``evidence`` is the `inercal.systems.aoa.design.Compared`.
+    ``evidence`` is the `inercal.systems.aoa.design.ComparedLayouts`.
     """
     from inercal.systems.aoa.design import REFERENCES, compare
 

@@ -21,7 +21,7 @@ _LOWER = (("y", "x"), ("z", "x"), ("z", "y"))
 
 
 @dataclass(frozen=True)
-class Noise:
+class TriadNoise:
     """Noise of a triad: ``white`` [SI/sqrt(Hz)], and a bias that wanders about its mean with standard
     deviation ``wander`` [SI] and correlation time ``wander_time`` [s] (first-order Gauss-Markov)."""
 
@@ -37,8 +37,8 @@ class ImuTruth:
     accelerometer: TriadModel
     gyro: TriadModel
     g_sensitivity: Array
-    accelerometer_noise: Noise
-    gyro_noise: Noise
+    accelerometer_noise: TriadNoise
+    gyro_noise: TriadNoise
 
     def values(self) -> dict[str, float]:
         """True coefficients by term symbol."""
@@ -75,8 +75,8 @@ def draw_truth(rng: np.random.Generator, g_sensitivity: float = 0.0) -> ImuTruth
         triad_from_terms(values, "K1", "M", "K0"),
         gyro,
         rng.normal(0.0, 1.0, (3, 3)) * g_sensitivity * gyro.scale[:, None],
-        Noise(white=8e-4, wander=3e-4),
-        Noise(white=5.6e-4, wander=5e-5),
+        TriadNoise(white=8e-4, wander=3e-4),
+        TriadNoise(white=5.6e-4, wander=5e-5),
     )
 
 
@@ -250,8 +250,8 @@ def as_stated(truth: ImuTruth, of: Simulation) -> ImuTruth:
     """The instrument with the coefficients and the noise that a study states."""
     return replace(
         with_values(truth, of.coefficients),
-        accelerometer_noise=Noise(of.accelerometer_noise, of.accelerometer_wander),
-        gyro_noise=Noise(of.gyro_noise, of.gyro_wander),
+        accelerometer_noise=TriadNoise(of.accelerometer_noise, of.accelerometer_wander),
+        gyro_noise=TriadNoise(of.gyro_noise, of.gyro_wander),
     )
 
 
@@ -281,7 +281,7 @@ def _knock(turn: slice, rate: float, angle: float, n: int, rng: np.random.Genera
     return made
 
 
-def wandering_noise(noise: Noise, n: int, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
+def wandering_noise(noise: TriadNoise, n: int, rate: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """White noise plus wandering bias, and the latter alone, (n, 3) each, in SI units, at a sample ``rate`` [Hz]."""
     from scipy.signal import lfilter
 

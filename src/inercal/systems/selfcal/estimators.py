@@ -21,7 +21,7 @@ GONE: Final[Mapping[str, FilterKind]] = {"mukf": "error-state", "lm": "map", "li
 """Estimators of version 0.2.0 that are no more, and what serves instead of each."""
 
 
-class Estimator(NamedTuple):
+class EstimatorWords(NamedTuple):
     """An estimator in ``words``, and the ``publications`` behind it beside those of self-calibration; ``rig``: it can
     have states of the rig."""
 
@@ -39,9 +39,9 @@ _LEFFERTS = (
     "Guidance, Control, and Dynamics 5 (1982) 417"
 )
 
-ESTIMATORS: Final[Mapping[FilterKind, Estimator]] = {
-    "error-state": Estimator("error-state filter", (_LEFFERTS,), rig=True),
-    "svd-qukf": Estimator("quaternion sigma-point filter", (_JULIER,)),
-    "gimbal-ukf": Estimator("gimbal-angle sigma-point filter", (_JULIER,)),
-    "map": Estimator("batch, largest posterior", rig=True),
+ESTIMATORS: Final[Mapping[FilterKind, EstimatorWords]] = {
+    "error-state": EstimatorWords("error-state filter", (_LEFFERTS,), rig=True),
+    "svd-qukf": EstimatorWords("quaternion sigma-point filter", (_JULIER,)),
+    "gimbal-ukf": EstimatorWords("gimbal-angle sigma-point filter", (_JULIER,)),
+    "map": EstimatorWords("batch, largest posterior", rig=True),
 }

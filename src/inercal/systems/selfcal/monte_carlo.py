@@ -18,7 +18,7 @@ from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.rotations import boxminus, conjugate
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
-from inercal.systems.selfcal.before.simulate import Experiment, Simulated, experiment, simulate
+from inercal.systems.selfcal.before.simulate import Experiment, SimulatedPlatform, experiment, simulate
 from inercal.systems.selfcal.estimators import FilterKind
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem
@@ -247,7 +247,9 @@ def _truth(experiment: Experiment, problem: FilterProblem) -> Array:
     return np.asarray(experiment.truth[problem.states.index])
 
 
-def _joint(filtered: FilterResult, simulated: Simulated, error: Array, slope: Array) -> tuple[Array, Array]:
+def _joint(
+    filtered: FilterResult, simulated: SimulatedPlatform, error: Array, slope: Array
+) -> tuple[Array, Array]:
     """Errors of attitude and coefficients together, and their covariance; coefficients alone without an attitude."""
     if filtered.state is None or len(filtered.state.attitude) != 4:
         return error, slope @ filtered.covariance @ slope.T

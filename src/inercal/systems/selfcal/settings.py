@@ -27,7 +27,7 @@ from inercal.foundation.units import Quantity, parse_quantity
 from inercal.systems.selfcal.estimators import FactorKind, FilterKind
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
-from inercal.systems.selfcal.platform.plan import Plan
+from inercal.systems.selfcal.platform.plan import PlatformPlan
 from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
 from inercal.systems.selfcal.platform.states import (
     ALL,
@@ -225,7 +225,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class RecordOnBase:
     """A record with a base of its own: its ``file`` as typed, the ``base``, unknown in heading where
     ``heading_unknown``, and the ``prior`` (24,) of the coefficients with that of the base."""
 
@@ -269,14 +269,14 @@ class SelfcalSettings:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     joints: JointLimits = field(default_factory=JointLimits)
     fixed: Mapping[str, float] = field(default_factory=dict)
-    plan: Plan | None = None
+    plan: PlatformPlan | None = None
     truth: Array | None = None
     goal: Mapping[str, float] = field(default_factory=dict)
     filter: Filter = field(default_factory=Filter)
     model: Model = field(default_factory=Model)
     disturbances: Disturbances = field(default_factory=Disturbances)
     search: Search = field(default_factory=Search)
-    placed: tuple[Placed, ...] = ()
+    placed: tuple[RecordOnBase, ...] = ()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

@@ -70,7 +70,7 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RecordPart:
     """A record: its name, its recording, and its problem, with the study's prior."""
 
     name: str
@@ -119,18 +119,18 @@ def placed(record: Record, settings: SelfcalSettings) -> SelfcalSettings:
     return found[0].of(settings)
 
 
-def parts_of(records: Sequence[Record], studies: Sequence[SelfcalSettings]) -> list[Part]:
+def parts_of(records: Sequence[Record], studies: Sequence[SelfcalSettings]) -> list[RecordPart]:
     """The records, without states that none of them can tell from others."""
     read = [based(record, study) for record, study in zip(records, studies, strict=True)]
     still = set.intersection(*({*still_joints(study, recording.th)} for recording, study in read))
     parts = []
     for record, (recording, study) in zip(records, read, strict=True):
         own = told_apart(study, sorted(still), recording.th[0])[0]
-        parts.append(Part(record.sources[0].path, recording, own, problem(own)))
+        parts.append(RecordPart(record.sources[0].path, recording, own, problem(own)))
     return parts
 
 
-class Fit(NamedTuple):
+class RecordFit(NamedTuple):
     """The coefficients ``x`` (q,) of some ``names``, linear form, with their ``covariance`` (q, q) and ``prior`` (q,);
     ``common`` (p,) true of them among the states; what each record ``said``; ``converged``; words where the records
     are ``apart``."""
@@ -145,7 +145,7 @@ class Fit(NamedTuple):
     apart: str
 
 
-def fit(parts: Sequence[Part]) -> Fit:
+def fit(parts: Sequence[RecordPart]) -> RecordFit:
     """The coefficients from all records."""
     states = parts[0].problem.names
     common = np.array([KIND_OF[name] != "beta" and ALL.index(name) < WALK for name in states])
@@ -162,7 +162,7 @@ def fit(parts: Sequence[Part]) -> Fit:
         if not size > _NEAR:
             break
     names = tuple(name for name, each in zip(states, common, strict=True) if each)
-    found = Fit(names, common, x, covariance, prior, said, size <= _NEAR, "")
+    found = RecordFit(names, common, x, covariance, prior, said, size <= _NEAR, "")
     return found._replace(apart=_contradiction(found, about, mean) if found.converged else "")
 
 
@@ -172,7 +172,7 @@ def _inverse(information: Array, scale: Array) -> Array:
     return np.asarray(0.5 * (inverse + inverse.T) * np.outer(scale, scale))
 
 
-def _likelihood(part: Part, common: NDArray[np.bool_], about: Array, width: Array) -> _Said:
+def _likelihood(part: RecordPart, common: NDArray[np.bool_], about: Array, width: Array) -> _Said:
     """Knowledge from a record, linearised ``about`` coefficients, from a prior of some ``width``."""
     of = part.problem
     stated, narrow = of.states.stated.copy(), of.prior.copy()
@@ -183,7 +183,7 @@ def _likelihood(part: Part, common: NDArray[np.bool_], about: Array, width: Arra
     return _Said(gain - np.diag(width**-2), gain @ (found.coefficients[common] - about))
 
 
-def _contradiction(fit: Fit, about: Array, mean: Array) -> str:
+def _contradiction(fit: RecordFit, about: Array, mean: Array) -> str:
     """Words where the records contradict each other: the sum of squares by which they differ from their common fit,
     chi-square with at most as many degrees of freedom as there are coefficients, but for one record."""
     from scipy.special import chdtrc
@@ -215,10 +215,10 @@ def _contradiction(fit: Fit, about: Array, mean: Array) -> str:
 
 
 def _assembled(
-    parts: Sequence[Part],
+    parts: Sequence[RecordPart],
     alone: Sequence[Calibration],
     settings: SelfcalSettings,
-    fit: Fit,
+    fit: RecordFit,
 ) -> Estimate:
     """The estimate with its budget, verdict and findings."""
     slope, values = product_slope(fit.x), to_product(fit.x)
@@ -283,7 +283,7 @@ def _assembled(
 
 
 def _besides(
-    parts: Sequence[Part], fit: Fit, u: Array, slope: Array
+    parts: Sequence[RecordPart], fit: RecordFit, u: Array, slope: Array
 ) -> tuple[list[TypeB], dict[str, str], list[Evidence]]:
     """Inputs of site, base and rig that are stated with an uncertainty: those of site and rig are the same in all
     records, heading and tilt another in each; in words, what is stated without one; and of each record what it says of
@@ -311,7 +311,7 @@ def _besides(
     return named, exact, left
 
 
-def _entry(part: Part, alone: Calibration) -> dict[str, Any]:
+def _entry(part: RecordPart, alone: Calibration) -> dict[str, Any]:
     """A record for JSON: its verdict by itself, the base, and what is its own."""
     estimate, base = alone.estimate, alone.settings.base
     of_record = {
@@ -331,7 +331,7 @@ def _entry(part: Part, alone: Calibration) -> dict[str, Any]:
 
 
 def _verdict(
-    parts: Sequence[Part], alone: Sequence[Calibration], judged: Observability, fit: Fit
+    parts: Sequence[RecordPart], alone: Sequence[Calibration], judged: Observability, fit: RecordFit
 ) -> tuple[Status, str]:
     """Status and sentence: those of a record that cannot be used, else of all together."""
     for part, each in zip(parts, alone, strict=True):

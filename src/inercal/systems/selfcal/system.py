@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.systems.contract import Channels, Design, Plan, System
+from inercal.systems.contract import Channels, OfferedDesign, OfferedPlan, System
 
 if TYPE_CHECKING:
     import numpy as np
@@ -127,12 +127,12 @@ SYSTEM = System(
     prepare=_prepare,
     compares=True,
     simulate=_simulate,
-    designs={"selfcal": Design(_design, _prepare_design)},
+    designs={"selfcal": OfferedDesign(_design, _prepare_design)},
     stream=_stream,
     streams="coefficients",
     foresight=_foresight,
     verticals=_verticals,
-    plan=Plan(
+    plan=OfferedPlan(
         "selfcal",
         ".toml",
         "z, 180 deg (joint, angle, and a rate of its own) or rest, 60 s",

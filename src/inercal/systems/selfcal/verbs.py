@@ -122,11 +122,11 @@ def prepare_design(study: Study) -> None:
     from inercal.systems.selfcal.before.bounds import bounds
     from inercal.systems.selfcal.before.path_search import left_out, shifts
     from inercal.systems.selfcal.filters.problem import problem
-    from inercal.systems.selfcal.platform.plan import Plan, Rest, motion
+    from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, motion
 
     settings = study.settings
     with study.at_fault():
-        resting, of = motion(Plan((Rest(0.2),)), settings.world), problem(settings)
+        resting, of = motion(PlatformPlan((Rest(0.2),)), settings.world), problem(settings)
         bounds(resting, of)
         shifts(resting, of, left_out(settings))
 

@@ -161,7 +161,7 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class Design:
+class PathDesign:
     """The search for a path, for `inercal design strapdown`."""
 
     turns: int = option("number of turns", 18, least=1, most=40)
@@ -192,7 +192,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Plan:
+class TurnPlan:
     """A plan: ``start`` pitch, roll, yaw [rad] of the first rest; ``turns`` (axis 0 to 2 of b, angle [rad])."""
 
     turns: tuple[tuple[int, float], ...] = ()
@@ -252,8 +252,8 @@ class StrapdownSettings:
     start: Start = field(default_factory=Start)
     prior: Prior = field(default_factory=Prior)
     goal: Goal = field(default_factory=Goal)
-    plan: Plan | None = None
-    design: Design | None = None
+    plan: TurnPlan | None = None
+    design: PathDesign | None = None
     motion: Motion = field(default_factory=Motion)
     truth: Mapping[str, float] = field(default_factory=dict)
     traceability: Mapping[str, str] = field(default_factory=dict)

@@ -20,7 +20,7 @@ from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.strapdown.model.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.settings import Motion, Noise, Plan, StrapdownSettings
+from inercal.systems.strapdown.settings import Motion, Noise, StrapdownSettings, TurnPlan
 
 AXES: Final[tuple[Axis, Axis, Axis]] = ("x", "y", "z")
 _ORDER: Final[tuple[Axis, Axis, Axis]] = ("z", "x", "y")
@@ -40,7 +40,7 @@ class Truth:
     C_nb: Array
 
 
-class Turn(NamedTuple):
+class UnitTurn(NamedTuple):
     """A turn from ``begin`` [s], lasting ``time``, from ``C_nb`` (3, 3) about ``axis`` by ``angle``, along ``path``."""
 
     begin: float
@@ -51,18 +51,20 @@ class Turn(NamedTuple):
     path: Array
 
 
-def _turns(plan: Plan, motion: Motion, rng: np.random.Generator) -> Iterator[Turn]:
+def _turns(plan: TurnPlan, motion: Motion, rng: np.random.Generator) -> Iterator[UnitTurn]:
     """The turns of a plan, one after the other; each goes along a way of random direction."""
     C, begin = start_attitude(plan), plan.first_dwell
     for axis, angle in plan.turns:
         time = plan.time_of(angle)
         direction = rng.standard_normal(3)
-        yield Turn(begin, time, C, axis, angle, motion.translation * direction / np.linalg.norm(direction))
+        yield UnitTurn(
+            begin, time, C, axis, angle, motion.translation * direction / np.linalg.norm(direction)
+        )
         C = np.asarray(C @ elementary(AXES[axis], angle))
         begin += time + plan.dwell
 
 
-def start_attitude(plan: Plan) -> Array:
+def start_attitude(plan: TurnPlan) -> Array:
     """C_nb (3, 3) of the first rest: from x east, y north, z up turned about z by yaw, then x by pitch, then y by
     roll."""
     pitch, roll, yaw = plan.start
@@ -81,7 +83,7 @@ def _bump(s: Array, size: float, rate: float, time: float) -> tuple[Array, Array
     return size * a * b, size * (da * b + a * db), size * (dda * b + 2.0 * da * db + a * ddb)
 
 
-def truth(turn: Turn, t: Array, motion: Motion, earth: Array, gravity: float) -> Truth:
+def truth(turn: UnitTurn, t: Array, motion: Motion, earth: Array, gravity: float) -> Truth:
     """Motion that the sensors meet at times (n,) within a turn, or before or after it."""
     s = np.clip((t - turn.begin) / turn.time, 0.0, 1.0)
     two_pi = 2.0 * np.pi
@@ -122,7 +124,7 @@ class _Means(NamedTuple):
     C_nb: Array
 
 
-def _means(turn: Turn, stamps: Array, settings: StrapdownSettings, c: Array, ts: float) -> _Means:
+def _means(turn: UnitTurn, stamps: Array, settings: StrapdownSettings, c: Array, ts: float) -> _Means:
     """Means over the samples that end at ``stamps`` (n,)."""
     latitude = settings.latitude
     earth = EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])

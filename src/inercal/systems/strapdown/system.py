@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.systems.contract import Channels, Design, Plan, System
+from inercal.systems.contract import Channels, OfferedDesign, OfferedPlan, System
 
 if TYPE_CHECKING:
     import numpy as np
@@ -122,12 +122,12 @@ SYSTEM = System(
     calibrate=_calibrate,
     prepare=_prepare,
     simulate=_simulate,
-    designs={"strapdown": Design(_design, _prepare_design)},
+    designs={"strapdown": OfferedDesign(_design, _prepare_design)},
     stream=_stream,
     streams="coefficients",
     foresight=_foresight,
     verticals=_verticals,
-    plan=Plan(
+    plan=OfferedPlan(
         "strapdown",
         ".toml",
         "y, 90 deg (axis of the unit, angle)",

@@ -53,10 +53,10 @@ def calibrate(
 def prepare_design(study: Study) -> None:
     """Load, or compile, the kernels of `design`."""
     from inercal.systems.strapdown.before.bounds import Pieces, bounds
-    from inercal.systems.strapdown.settings import Plan
+    from inercal.systems.strapdown.settings import TurnPlan
 
     with study.at_fault():
-        bounds(Pieces(study.settings), Plan(((0, 1.0),)))
+        bounds(Pieces(study.settings), TurnPlan(((0, 1.0),)))
 
 
 def design(study: Study, progress: Callable[[int, int], None] | None = None) -> Result:

@@ -32,7 +32,7 @@ class Stated:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class ReferenceInput:
     """An input on which gravity or earth rate depends: its standard uncertainty ``u`` [``unit``], and the change
     ``a_n``, ``w_n`` (3,) of the references in n per unit of it."""
 
@@ -79,7 +79,7 @@ class TableModel:
     w_n: Array
     channels: tuple[ChannelModel, ...]
     stated: tuple[Stated, ...] = ()
-    references: tuple[Reference, ...] = ()
+    references: tuple[ReferenceInput, ...] = ()
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -232,14 +232,14 @@ def _stated(settings: TurntableSettings, model: ChannelModel, rest: ChannelModel
     return Stated(rest, linear[places], np.abs(u))
 
 
-def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
+def _references(settings: TurntableSettings) -> tuple[ReferenceInput, ...]:
     """Uncertain inputs of gravity and earth rate."""
     site, still = settings.site, np.zeros(3)
     assert site.latitude is not None
     # in units of the site's gravity, gravity is one whatever its value
     up = still if settings.instrument.kind == "gyrowheel" else np.array([0.0, 0.0, 1.0])
     references = {
-        (each.source, each.u, each.unit): Reference(
+        (each.source, each.u, each.unit): ReferenceInput(
             each.source, each.u, each.unit, up * each.sensitivity, still
         )
         for each in site.inputs
@@ -247,7 +247,7 @@ def _references(settings: TurntableSettings) -> tuple[Reference, ...]:
     if site.latitude_u > 0.0:
         key = ("latitude", site.latitude_u, "rad")
         w_n = EARTH_RATE * np.array([-np.sin(site.latitude), 0.0, np.cos(site.latitude)])
-        references[key] = Reference(*key, references[key].a_n if key in references else still, w_n)
+        references[key] = ReferenceInput(*key, references[key].a_n if key in references else still, w_n)
     return tuple(references.values())
 
 

@@ -103,7 +103,7 @@ class Constraint:
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class PositionDesign:
     """The search for positions.
 
     ``candidates`` from which to choose; ``compare`` named plans to set beside; ``constraint`` the paper's.
@@ -261,7 +261,7 @@ class TurntableSettings:
     rig: str
     chain: Chain
     plan: Plan
-    design: Design
+    design: PositionDesign
     analysis: Analysis = Analysis()
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.systems.contract import Channels, Design, Plan, System
+from inercal.systems.contract import Channels, OfferedDesign, OfferedPlan, System
 
 if TYPE_CHECKING:
     import numpy as np
@@ -133,12 +133,12 @@ SYSTEM = System(
     guess={"on_table": True},
     calibrate=_calibrate,
     simulate=_simulate,
-    designs={"positions": Design(_positions), "tolerances": Design(_tolerances)},
+    designs={"positions": OfferedDesign(_positions), "tolerances": OfferedDesign(_tolerances)},
     sensitivity=_sensitivity,
     loaded=_loaded,
     foresight=_foresight,
     verticals=_verticals,
-    plan=Plan(
+    plan=OfferedPlan(
         "positions",
         ".csv",
         "90, 45 (angles of the axes in deg, outer first)",

@@ -26,7 +26,7 @@ _NONE = ""
 
 
 @dataclass(frozen=True)
-class Part:
+class FileColumns:
     """The columns of one file in a map: the ``table`` they stand in, the file, those that are there, and in use."""
 
     table: str
@@ -37,16 +37,16 @@ class Part:
 
 def parts_of(
     session: Session, data: Mapping[str, Any], there: Mapping[Path, tuple[str, ...]]
-) -> Iterator[Part]:
+) -> Iterator[FileColumns]:
     """The parts of a map, of which one is of all recordings alike, or each of a file of its own."""
     files = [part for part in data.get("file", {}).items() if isinstance(part[1], dict)]
     if not files:
         path = session.recordings[0]
-        yield Part("columns", path, there.get(path, ()), data.get("columns", {}))
+        yield FileColumns("columns", path, there.get(path, ()), data.get("columns", {}))
     for number, (name, part) in enumerate(files):
         named = [path for path in session.recordings if path.name == part.get("path")]
         path = (named or session.recordings)[min(number, len(session.recordings) - 1) if not named else 0]
-        yield Part(f"file.{name}.columns", path, there.get(path, ()), part.get("columns", {}))
+        yield FileColumns(f"file.{name}.columns", path, there.get(path, ()), part.get("columns", {}))
 
 
 def columns_there(session: Session) -> dict[Path, tuple[str, ...]]:
@@ -107,7 +107,7 @@ class Columns:
                 table(["Channel", "From", "Unit", "Sign", "Kind"], rows)
                 self.more(part)
 
-    def row(self, part: Part, name: str, entry: Mapping[str, Any]) -> list[Any]:
+    def row(self, part: FileColumns, name: str, entry: Mapping[str, Any]) -> list[Any]:
         """A channel of the map."""
         path = f"{part.table}.{name}"
         taken = _written(entry.get("from"))
@@ -145,7 +145,7 @@ class Columns:
 
         return [name, origin, unit, sign, kind]
 
-    def more(self, part: Part) -> None:
+    def more(self, part: FileColumns) -> None:
         """One more channel, by its name, from a column that is not in use."""
         used = {_written(each.get("from")) for each in part.columns.values() if isinstance(each, dict)}
         left = [each for each in part.there if each not in used]
@@ -158,7 +158,7 @@ class Columns:
             unit = ui.input("Unit", placeholder="degC").props("dense").classes("w-28")
             button("Add", partial(self.add, part, name, column, unit))
 
-    async def add(self, part: Part, name: ui.input, column: ui.select, unit: ui.input) -> None:
+    async def add(self, part: FileColumns, name: ui.input, column: ui.select, unit: ui.input) -> None:
         """Add a channel."""
         given = (name.value or "").strip()
         if not is_channel(given):

@@ -11,7 +11,7 @@ import numpy as np
 from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.jobs import ENDED, Job, State
+from inercal.bench.workbench.jobs import ENDED, Job, JobState
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,
@@ -34,7 +34,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.designs.foresight import Foresight
 from inercal.foundation.errors import InercalError
 from inercal.foundation.results.shown import short
-from inercal.systems.contract import Plan
+from inercal.systems.contract import OfferedPlan
 from inercal.systems.listed import SYSTEMS
 
 _MIDDLE, _END = 50, 100
@@ -66,7 +66,7 @@ def add(bench: Bench) -> None:
 class Desk:
     """The plan of a study, edited as lines; what is shown follows."""
 
-    def __init__(self, bench: Bench, session: Session, plan: Plan) -> None:
+    def __init__(self, bench: Bench, session: Session, plan: OfferedPlan) -> None:
         self.bench, self.session, self.plan, self.plans = bench, session, plan, named(plan)
         self.foresight: Foresight | None = None
         self.factors: Array = np.ones(0)
@@ -272,14 +272,14 @@ class Desk:
 
         def look() -> None:
             now = self.bench.queue.get(job.id)
-            of = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
+            of = f": {now.progress}" if now.state is JobState.RUNNING and now.progress else ""
             what = "search" if self.plan.ending else "comparison"
             state.set_text(f"The {what} (job {now.id}) {WORDS[now.state]}{of}")
             if now.state not in ENDED:
                 return
             timer.deactivate()
             with place:
-                if now.said.strip() and now.state is not State.DONE:
+                if now.said.strip() and now.state is not JobState.DONE:
                     refused(InercalError(now.said.strip()))
                 if self.plan.ending and plan.is_file():
                     button("Take the plan found", lambda: self.take(plan.read_text()), main=True)

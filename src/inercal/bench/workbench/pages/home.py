@@ -8,7 +8,7 @@ from functools import partial
 from nicegui import ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.jobs import ENDED, Job, State
+from inercal.bench.workbench.jobs import ENDED, Job, JobState
 from inercal.bench.workbench.pages.frame import button, framed, heading, table, told
 from inercal.bench.workbench.sessions import Session
 from inercal.examples import EXAMPLES, Example
@@ -77,7 +77,7 @@ def drop() -> None:
 def _watched(bench: Bench, every: bool) -> None:
     """Jobs that run or wait, and the sessions; drawn anew when a job begins or ends."""
     place = ui.element("div").classes("w-full flex flex-col gap-3")
-    at_work: list[tuple[str, State]] | None = None
+    at_work: list[tuple[str, JobState]] | None = None
     progress: dict[str, ui.label] = {}
 
     def look() -> None:

@@ -18,8 +18,8 @@ from inercal.bench.workbench.bench import Bench
 from inercal.bench.workbench.live_status import rows, status
 from inercal.bench.workbench.measurements import (
     MEASURED,
-    Live,
     Wish,
+    WishedMeasurement,
     begun_with,
     interval_of,
     next_name,
@@ -56,7 +56,7 @@ def add(bench: Bench) -> None:
                 session = bench.by_wire(kind)
                 ui.navigate.to(f"/sessions/{session.id}/study")
 
-        with framed("Live"):
+        with framed("WishedMeasurement"):
             heading("At work")
             going_on = bench.measurements.at_work
             if not going_on:
@@ -89,7 +89,7 @@ class _Desk:
                 self.end = button("Stop", self.stop)
         self.seen = ui.element("div").classes("w-full")
         self.files = ui.element("div").classes("w-full")
-        self.shown: Live | None = None
+        self.shown: WishedMeasurement | None = None
         self.view: _View | None = None
         self.look()
         ui.timer(_EVERY, self.look)
@@ -204,7 +204,7 @@ class _Desk:
 class _View:
     """The view of a measurement: picture, results, channels, counts, alarms."""
 
-    def __init__(self, live: Live) -> None:
+    def __init__(self, live: WishedMeasurement) -> None:
         self.live, self.over = live, False
         self.rows: list[list[Any]] = []
         self.columns: list[str] = []

@@ -10,7 +10,7 @@ from nicegui import events, ui
 
 from inercal.bench.workbench.advice import Advice, advice_of
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.jobs import Job, State
+from inercal.bench.workbench.jobs import Job, JobState
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,
@@ -281,7 +281,7 @@ async def _done(bench: Bench, job: Job, words: str, place: ui.element) -> Job:
 
 def _say(job: Job, words: str) -> None:
     """Tell how a job has ended that one waited for."""
-    good = job.state is State.DONE and job.code == 0
+    good = job.state is JobState.DONE and job.code == 0
     said = job.said.strip() or job.state.value
     ui.notify(words if good else said, type="positive" if good else "negative", multi_line=True, close_button="Close",
               timeout=5000 if good else 0)  # fmt: skip

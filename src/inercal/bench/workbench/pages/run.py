@@ -7,7 +7,7 @@ import re
 from nicegui import ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.jobs import ENDED, Job, State
+from inercal.bench.workbench.jobs import ENDED, Job, JobState
 from inercal.bench.workbench.pages.frame import button, command, framed, heading, table, told
 from inercal.bench.workbench.sessions import Session
 from inercal.foundation.records.places import counted
@@ -16,12 +16,12 @@ _EVERY = 0.3
 """Time [s] between two looks at a job."""
 
 WORDS = {
-    State.WAITING: "waits for the jobs before it",
-    State.RUNNING: "is running",
-    State.DONE: "is done",
-    State.REFUSED: "was refused",
-    State.CANCELLED: "was cancelled",
-    State.INTERRUPTED: "was interrupted when the workbench ended: start it again",
+    JobState.WAITING: "waits for the jobs before it",
+    JobState.RUNNING: "is running",
+    JobState.DONE: "is done",
+    JobState.REFUSED: "was refused",
+    JobState.CANCELLED: "was cancelled",
+    JobState.INTERRUPTED: "was interrupted when the workbench ended: start it again",
 }
 
 
@@ -69,7 +69,7 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
 
     def look() -> None:
         now = bench.queue.get(job.id)
-        progress = now.progress if now.state is State.RUNNING else ""
+        progress = now.progress if now.state is JobState.RUNNING else ""
         state.set_text(f"The job {_words(bench, now)}" + (f": {progress}" if progress else ""))
         part = part_of(progress)
         bar.props(remove="indeterminate") if part is not None else bar.props("indeterminate")
@@ -81,7 +81,7 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
         again.set_visibility(over)
         if over:
             timer.deactivate()
-            if now.state is State.DONE and not begun:
+            if now.state is JobState.DONE and not begun:
                 ui.navigate.to(f"/sessions/{session.id}/result")
 
     timer = ui.timer(_EVERY, look)
@@ -90,7 +90,7 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
 def _words(bench: Bench, job: Job) -> str:
     """The state of a job; where it waits, for how many."""
     before = sum(each.state not in ENDED and each.id < job.id for each in bench.queue)
-    if job.state is State.WAITING and before:
+    if job.state is JobState.WAITING and before:
         return f"waits for {counted(before, 'job')} before it"
     return WORDS[job.state]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.form import Key, Table, as_toml, problem, tables
+from inercal.bench.workbench.form import FormKey, FormTable, as_toml, problem, tables
 from inercal.bench.workbench.pages.frame import button, command, copy, framed, heading, refused, saved, told
 from inercal.bench.workbench.sessions import STUDY, Session, put
 from inercal.faces.studies.text import changed, parsed
@@ -91,7 +91,7 @@ class Editor:
         self.judge()
         self.fill()
 
-    def change(self, key: Key, value: str) -> None:
+    def change(self, key: FormKey, value: str) -> None:
         """A key of the form was changed: so is the text."""
         with told():
             self.text = changed(self.text, key.path, as_toml(value, key.widget))
@@ -119,7 +119,7 @@ class Editor:
             for each in sorted(found, key=lambda each: not given[each.name]):
                 self.table(each, given[each.name])
 
-    def table(self, table: Table, given: bool) -> None:
+    def table(self, table: FormTable, given: bool) -> None:
         """One table: the keys it has, then those it may have."""
         if not given:
             head = f"[{table.name}] {table.says}" if table.name else "Tables of names of one's own"
@@ -133,7 +133,7 @@ class Editor:
         if more:
             self.folded(f"{len(more)} more keys of [{table.name}]", more)
 
-    def folded(self, head: str, keys: tuple[Key, ...]) -> None:
+    def folded(self, head: str, keys: tuple[FormKey, ...]) -> None:
         """Keys that are drawn when somebody opens them."""
         place = ui.expansion(head).classes("w-full").props("dense")
         drawn: list[bool] = []
@@ -146,7 +146,7 @@ class Editor:
 
         place.on_value_change(opened)
 
-    def keys(self, keys: tuple[Key, ...]) -> None:
+    def keys(self, keys: tuple[FormKey, ...]) -> None:
         """Keys, each as it is typed."""
         for key in keys:
             with ui.element("div").classes("w-full mb-2"):
@@ -154,10 +154,10 @@ class Editor:
                 ui.label(key.says).classes("quiet text-sm")
 
 
-Changed = Callable[[Key, str], None]
+Changed = Callable[[FormKey, str], None]
 
 
-def _choice(key: Key, change: Changed) -> None:
+def _choice(key: FormKey, change: Changed) -> None:
     """A choice among words."""
     ui.select(
         ["", *key.choices], value=key.value if key.value in key.choices else "", label=key.name,
@@ -165,14 +165,14 @@ def _choice(key: Key, change: Changed) -> None:
     ).props("dense outlined").classes("w-full")  # fmt: skip
 
 
-def _switch(key: Key, change: Changed) -> None:
+def _switch(key: FormKey, change: Changed) -> None:
     """True or false."""
     ui.checkbox(
         key.name, value=key.value == "true", on_change=lambda event: change(key, str(event.value).lower())
     )
 
 
-def _typed(key: Key, change: Changed) -> None:
+def _typed(key: FormKey, change: Changed) -> None:
     """A text, a quantity with its unit, or a value of TOML."""
     field = ui.input(
         label=key.name, value="" if key.value == _OPEN else key.value, placeholder=key.example,
@@ -182,7 +182,7 @@ def _typed(key: Key, change: Changed) -> None:
         field.props('hint="to be filled in"')
 
 
-_WIDGETS: dict[str, Callable[[Key, Changed], None]] = {
+_WIDGETS: dict[str, Callable[[FormKey, Changed], None]] = {
     "choice": _choice,
     "switch": _switch,
     "text": _typed,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from inercal.bench.workbench.bench import VALIDATION, Bench
-from inercal.bench.workbench.jobs import ENDED, Job, State
+from inercal.bench.workbench.jobs import ENDED, Job, JobState
 from inercal.bench.workbench.pages.frame import button, command, framed, report, told
 from inercal.bench.workbench.pages.run import WORDS
 
@@ -37,7 +37,7 @@ def _follow(bench: Bench, job: Job) -> None:
 
     def look() -> None:
         now = bench.queue.get(job.id)
-        progress = f": {now.progress}" if now.state is State.RUNNING and now.progress else ""
+        progress = f": {now.progress}" if now.state is JobState.RUNNING and now.progress else ""
         state.set_text(f"Job {now.id} {WORDS[now.state]}{progress}")
         if now.state not in ENDED:
             return

@@ -17,7 +17,7 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.checks import check
 from inercal.foundation.records.read.join import FileTable, joined
 from inercal.foundation.records.read.limits import size_of
-from inercal.foundation.records.read.table import Format, Part, Reader
+from inercal.foundation.records.read.table import FileShare, Format, Reader
 from inercal.foundation.records.record import Record
 from inercal.foundation.records.stamps import with_sound_stamps
 from inercal.foundation.units import Unit
@@ -41,7 +41,7 @@ FORMATS = {
     **dict.fromkeys((".bag", ".mcap", ".db3"), "bags"),
 }
 
-_CANONICAL = Part(channels=None)
+_CANONICAL = FileShare(channels=None)
 
 
 def read(
@@ -184,7 +184,7 @@ def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: 
     )
 
 
-def _assigned(files: Sequence[Path], record_map: RecordMap) -> list[tuple[Path, Part]]:
+def _assigned(files: Sequence[Path], record_map: RecordMap) -> list[tuple[Path, FileShare]]:
     """Each file with its part of the map: ``[file.NAME]`` by file name, ``[columns]`` for all others.
 
     A named file that is not given is looked for beside the map.
@@ -192,7 +192,7 @@ def _assigned(files: Sequence[Path], record_map: RecordMap) -> list[tuple[Path, 
     parts = [_without_time(part) if record_map.ignore_time else part for part in record_map.parts]
     named = [part for part in parts if part.name]
     plain = next((part for part in parts if not part.name), None)
-    jobs: list[tuple[Path, Part]] = []
+    jobs: list[tuple[Path, FileShare]] = []
     for file in files:
         its_own = [part for part in named if Path(part.path).name == file.name]
         its_own = its_own or ([] if plain is None else [plain])
@@ -213,7 +213,7 @@ def files_named(files: Sequence[Path], record_map: RecordMap) -> tuple[Path, ...
     return tuple(path for path, _ in _assigned(files, record_map))
 
 
-def _without_time(part: Part) -> Part:
+def _without_time(part: FileShare) -> FileShare:
     """A part whose time column is not to be trusted, and so not to be read."""
     return replace(part, channels=tuple(channel for channel in part.channels or () if channel.name != "t"))
 
@@ -244,7 +244,7 @@ def canonical_units(paths: Sequence[Path]) -> dict[str, Unit] | None:
         return None
 
 
-def _read_one(form: Reader, path: Path, part: Part, progress: Callable[[int], None]) -> list[FileTable]:
+def _read_one(form: Reader, path: Path, part: FileShare, progress: Callable[[int], None]) -> list[FileTable]:
     """The wanted columns of one file, a table for each clock, and the hash of its bytes."""
     try:
         before = _state(path)
@@ -272,7 +272,7 @@ def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, 
         progress(before + done, total)
 
 
-def _form(path: Path, part: Part) -> Reader:
+def _form(path: Path, part: FileShare) -> Reader:
     """The module that reads a file as its part of the map says; raises `RecordError` if there is none."""
     if not part.options.binary:
         form = format_of(path)

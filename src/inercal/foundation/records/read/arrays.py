@@ -23,7 +23,7 @@ from inercal.foundation.records.checks import missing, too_long
 from inercal.foundation.records.places import counted_names, shortened
 from inercal.foundation.records.read.child import Tell, Work, in_child
 from inercal.foundation.records.read.limits import FIELDS, check_unpacked, memory, size_of
-from inercal.foundation.records.read.table import LARGEST, FileOptions, Sample, Table
+from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
 from inercal.foundation.records.titles import bare, canonical
 from inercal.foundation.units import parse_unit
 
@@ -130,7 +130,7 @@ class ArrayFormat:
         options: FileOptions,
         channels: tuple[Channel, ...] | None,
         progress: Callable[[int], None],
-    ) -> list[Table]:
+    ) -> list[RawTable]:
         """Read the wanted columns, or those that canonical names and units tell."""
         return self._in_child(partial(self._read, path, options, channels), path, progress)
 
@@ -138,7 +138,7 @@ class ArrayFormat:
         """The channels that canonical names and units tell; raises `InputError` where there are none."""
         return self._in_child(partial(self._header, path), path)
 
-    def peek(self, path: Path) -> list[Sample]:
+    def peek(self, path: Path) -> list[FirstLook]:
         """Look at the arrays of a file."""
         return self._in_child(partial(self._peek, path), path)
 
@@ -149,7 +149,7 @@ class ArrayFormat:
 
     def _read(
         self, path: Path, options: FileOptions, channels: tuple[Channel, ...] | None, progress: Tell
-    ) -> list[Table]:
+    ) -> list[RawTable]:
         """As `read`, in the child."""
         with self._lent(path) as lent:
             contents = transposed(lent, path) if options.transpose else lent
@@ -163,7 +163,7 @@ class ArrayFormat:
         with self._lent(path) as contents:
             return self_named(contents, path)
 
-    def _peek(self, path: Path, _: Tell) -> list[Sample]:
+    def _peek(self, path: Path, _: Tell) -> list[FirstLook]:
         """As `peek`, in the child."""
         with self._lent(path) as contents:
             return samples(contents, path)
@@ -213,7 +213,7 @@ def self_named(contents: Contents, path: Path) -> tuple[Channel, ...]:
 
 def tables(
     contents: Contents, options: FileOptions, channels: tuple[Channel, ...], path: Path, mapped: bool
-) -> list[Table]:
+) -> list[RawTable]:
     """Those of the channels that the file holds, in a table for each clock.
 
     A wanted column t is the clock of all arrays with as many rows, of those that state a clock only if it
@@ -225,7 +225,7 @@ def tables(
     for channel, clock in _clocks(placed, contents.arrays, mapped).items():
         groups.setdefault(clock, {})[channel] = placed[channel]
     if not groups:
-        return [Table((), {}, contents.words, 0, (), contents.findings)]
+        return [RawTable((), {}, contents.words, 0, (), contents.findings)]
     parts = [_table(contents, group, clock, path) for clock, group in groups.items()]
     numbers = (column for part in parts for column in (*part.values.values(), part.clock))
     if all(column is None or np.isnan(column).all() for column in numbers):
@@ -233,7 +233,7 @@ def tables(
     return parts
 
 
-def samples(contents: Contents, path: Path) -> list[Sample]:
+def samples(contents: Contents, path: Path) -> list[FirstLook]:
     """A first look at the arrays of a file: single columns by length, with their names, and each table."""
     arrays = {name: array for name, array in islice(contents.arrays.items(), FIELDS) if array.rows > 1}
     check_unpacked(path, sum(8 * each.rows * each.columns for each in arrays.values()), size_of(path))
@@ -245,11 +245,11 @@ def samples(contents: Contents, path: Path) -> list[Sample]:
                 [np.full(rows, np.nan) if each.text else _numbers(each.load(0)) for each in single.values()]
             )
             units = tuple(each.unit for each in single.values())
-            looks.append(Sample(values, tuple(single), FileOptions(), units=units))
+            looks.append(FirstLook(values, tuple(single), FileOptions(), units=units))
     for name, array in arrays.items():
         if array.columns > 1 and not array.text:
             values = np.column_stack([_numbers(array.load(column)) for column in range(array.columns)])
-            looks.append(Sample(values, (), FileOptions(), name))
+            looks.append(FirstLook(values, (), FileOptions(), name))
     return looks
 
 
@@ -275,7 +275,7 @@ def _clocks(
 
 def _table(
     contents: Contents, places: Mapping[Channel, tuple[str, int]], clock: str | None, path: Path
-) -> Table:
+) -> RawTable:
     """The columns of one clock."""
     values: dict[str, Array] = {}
     labels: tuple[str, ...] = ()
@@ -303,7 +303,7 @@ def _table(
     if clock is not None:
         array = contents.arrays[clock]
         stamps = _numbers(array.load(0)) * parse_unit(array.unit or "s", f"{path}: {clock}").factor
-    return Table(
+    return RawTable(
         tuple(places), values, contents.words, max(rows.values()), labels,
         (*contents.findings, *missing(values), *long), stamps,
     )  # fmt: skip

@@ -26,7 +26,7 @@ from inercal.foundation.records.places import counted, counted_names, shortened
 from inercal.foundation.records.read.arrays import Contents, guarded, held, reason, samples, tables
 from inercal.foundation.records.read.child import in_child
 from inercal.foundation.records.read.limits import FIELDS, NESTING, size_of
-from inercal.foundation.records.read.table import FileOptions, Sample, Table
+from inercal.foundation.records.read.table import FileOptions, FirstLook, RawTable
 from inercal.foundation.units import parse_unit
 
 _IMU = "sensor_msgs/msg/Imu"
@@ -91,7 +91,7 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> list[Table]:
+) -> list[RawTable]:
     """Read the mapped fields, or those of the only topic of `sensor_msgs/Imu`, in one pass over the messages.
 
     The stamps of the headers are the clock of a topic, unless all are zero.
@@ -102,7 +102,7 @@ def read(
 
 def _read(
     path: Path, options: FileOptions, channels: tuple[Channel, ...] | None, progress: Callable[[int], None]
-) -> list[Table]:
+) -> list[RawTable]:
     """As `read`, in a child."""
     with _opened(path) as bag:
         wanted = _imu(bag, path) if channels is None else channels
@@ -125,13 +125,13 @@ def _header(path: Path, _: Callable[[int], None]) -> tuple[Channel, ...]:
         return _imu(bag, path)
 
 
-def peek(path: Path) -> list[Sample]:
+def peek(path: Path) -> list[FirstLook]:
     """Look at the first messages of the topics of `sensor_msgs/Imu`, or of all where there are none."""
     _library()
     return in_child(partial(_peek, path), path)
 
 
-def _peek(path: Path, _: Callable[[int], None]) -> list[Sample]:
+def _peek(path: Path, _: Callable[[int], None]) -> list[FirstLook]:
     """As `peek`, in a child."""
     with _opened(path) as bag:
         topics = [name for name, topic in bag.topics.items() if topic.kind == _IMU] or list(bag.topics)

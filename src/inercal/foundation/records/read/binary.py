@@ -12,10 +12,10 @@ import numpy as np
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import Channel
-from inercal.foundation.records.frames import Frame, Turns, frames_in
+from inercal.foundation.records.frames import CounterTurns, Frame, frames_in
 from inercal.foundation.records.read.arrays import Contents, held, tables
 from inercal.foundation.records.read.limits import check_unpacked, unpacked
-from inercal.foundation.records.read.table import FileOptions, Table
+from inercal.foundation.records.read.table import FileOptions, RawTable
 
 
 def read(
@@ -23,7 +23,7 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> list[Table]:
+) -> list[RawTable]:
     """Read the wanted fields; bytes at the end that are no whole row are a finding, and those in no sound frame.
 
     Raises `RecordError` where there is no whole row.
@@ -86,7 +86,7 @@ def contents_of_frames(raw: bytes, frame: Frame, channels: tuple[Channel, ...], 
         )
         findings.append(Finding("bad_row", text))
     if frame.counter:
-        missing = Turns().on(columns[frame.counter])[0].missing
+        missing = CounterTurns().on(columns[frame.counter])[0].missing
         if missing:
             findings.append(Finding("gap", f"{missing} frames are missing by their counter {frame.counter}"))
     if rest := len(raw) - found.consumed:
@@ -94,5 +94,5 @@ def contents_of_frames(raw: bytes, frame: Frame, channels: tuple[Channel, ...], 
         findings.append(Finding("truncated", text, f"row {len(found.rows) + 1}"))
     stamp = next((channel.origin for channel in channels if channel.name == "t"), None)
     if stamp in columns and columns[stamp].dtype.kind == "u":
-        columns[stamp] = Turns().on(columns[stamp])[1]
+        columns[stamp] = CounterTurns().on(columns[stamp])[1]
     return Contents({name: held(each) for name, each in columns.items()}, tuple(findings), tabular=True)

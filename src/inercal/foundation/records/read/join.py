@@ -17,7 +17,7 @@ from inercal.foundation.errors import MapError, RecordError
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.channels import Channel, of_a_table
 from inercal.foundation.records.column import Column
-from inercal.foundation.records.read.table import Part, Table
+from inercal.foundation.records.read.table import FileShare, RawTable
 from inercal.foundation.units import Unit, parse_unit, shown
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ class FileTable:
 
     path: Path
     source: Source
-    part: Part
-    table: Table
+    part: FileShare
+    table: RawTable
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -132,7 +132,7 @@ _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """Layout of the lines of a text file.
 
     ``delimiter`` None is any run of blanks; ``decimal`` is empty as long as no number has told; ``width`` is the
@@ -178,7 +178,7 @@ class Layout:
         places = {len(each.strip().partition(mark)[2]) for each in before}
         return len(before) >= _ENOUGH and places == {len(text.strip().partition(mark)[2])} != {0}
 
-    def settled(self, lines: Iterable[str]) -> Layout:
+    def settled(self, lines: Iterable[str]) -> TextLayout:
         """The layout with the decimal mark of the first of more lines that tells it, where none has told so far."""
         if self.decimal:
             return self
@@ -206,7 +206,7 @@ def is_rounded(text: str, value: float) -> bool:
     return whole is not None and int(whole[1]) != abs(value)
 
 
-def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layout:
+def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> TextLayout:
     """Find out from the first lines of a file what ``options`` leave open.
 
     Raises `RecordError` where there are no rows, or the header does not fit them.
@@ -229,7 +229,7 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
     width = Counter(len(_split(line, delimiter)) for line in sample).most_common(1)[0][0]
 
     index, line = rows[0]
-    layout = Layout(delimiter, decimal, comments, width, (), 0, index)
+    layout = TextLayout(delimiter, decimal, comments, width, (), 0, index)
     names = _names(line, delimiter)
     if not is_header(layout, names):
         return layout
@@ -247,7 +247,7 @@ def find_layout(lines: Sequence[str], options: FileOptions, path: Path) -> Layou
             f"line {index + 1}: found {len(names)} names over rows of {width} fields, expected as many "
             "(`skip` under [file] passes over lines before the header)",
         )
-    return Layout(delimiter, decimal, comments, width, names, index + 1, index + 1)
+    return TextLayout(delimiter, decimal, comments, width, names, index + 1, index + 1)
 
 
 def comment_marks(options: FileOptions) -> tuple[str, ...]:
@@ -257,7 +257,7 @@ def comment_marks(options: FileOptions) -> tuple[str, ...]:
     return (options.comment,) if options.comment else ()
 
 
-def is_header(layout: Layout, fields: Sequence[str]) -> bool:
+def is_header(layout: TextLayout, fields: Sequence[str]) -> bool:
     """True if most of the fields are words rather than numbers."""
     words = sum(layout.number(field) is None for field in fields)
     return 2 * words > len(fields)

@@ -15,7 +15,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.records.channels import Channel
 from inercal.foundation.records.read.arrays import ArrayFormat, Contents, NamedArray, held
 from inercal.foundation.records.read.limits import NESTING
-from inercal.foundation.records.read.table import FileOptions, Table
+from inercal.foundation.records.read.table import FileOptions, RawTable
 
 _HEAD = 128
 _ORDERS = {b"IM": "<", b"MI": ">"}
@@ -28,7 +28,7 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> list[Table]:
+) -> list[RawTable]:
     """Read the mapped columns of the arrays in a MAT file; members of structures are ``"imu/acc"``."""
     if channels is None:
         header(path)

@@ -39,7 +39,7 @@ class FileOptions:
 
 
 @dataclass(frozen=True)
-class Part:
+class FileShare:
     """A file's share of a map: its options and the channels wanted from it.
 
     ``name`` and ``path`` are those of ``[file.NAME]``, empty for the plain ``[columns]``. ``channels`` is
@@ -53,7 +53,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Table:
+class RawTable:
     """Raw columns of one file, or those of one clock where a file has several.
 
     ``values`` holds an array (n,) for each channel found, as in the file, before sign, scale and unit; what
@@ -72,7 +72,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Sample:
+class FirstLook:
     """A first look at an array of a file, to guess a map from.
 
     ``values`` (n, k) are its columns (text is NaN), ``names`` (k,) its header and ``units`` (k,) those stated
@@ -96,7 +96,7 @@ class Reader(Protocol):
         options: FileOptions,
         channels: tuple[Channel, ...] | None,
         progress: Callable[[int], None],
-    ) -> list[Table]:
+    ) -> list[RawTable]:
         """Read those of the channels that the file holds; ``progress`` is told the bytes done.
 
         A table for each clock, one at least. Without ``channels``, those that the file itself names.
@@ -109,5 +109,5 @@ class Format(Reader, Protocol):
     def header(self, path: Path) -> tuple[Channel, ...]:
         """The channels that the file itself names, with units; raises `InputError` where it names none."""
 
-    def peek(self, path: Path) -> list[Sample]:
+    def peek(self, path: Path) -> list[FirstLook]:
         """Look at the beginning of each array in the file."""

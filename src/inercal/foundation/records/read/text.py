@@ -23,8 +23,8 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import Channel, may_be_empty
 from inercal.foundation.records.checks import too_long
 from inercal.foundation.records.places import counted, counted_names, places, shortened
-from inercal.foundation.records.read.layout import Block, Layout, blocks, find_layout, is_rounded
-from inercal.foundation.records.read.table import LARGEST, FileOptions, Sample, Table
+from inercal.foundation.records.read.layout import Block, TextLayout, blocks, find_layout, is_rounded
+from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
 from inercal.foundation.records.titles import EXAMPLE, bare, canonical
 from inercal.foundation.units import shown
 
@@ -51,7 +51,7 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> list[Table]:
+) -> list[RawTable]:
     """Read a text file as one table; without ``channels`` its header must be canonical (``t [s],acc_x [m/s^2]``)."""
     with path.open("rb") as file:
         stream = blocks(file, path)
@@ -61,7 +61,7 @@ def read(
         numbers = {channel.name: index for channel, index in located.items() if channel.name != "label"}
         label = next((index for channel, index in located.items() if channel.name == "label"), None)
         if not numbers:
-            return [Table((), {}, contents(layout), 0)]
+            return [RawTable((), {}, contents(layout), 0)]
 
         pieces: list[list[Array]] = [[] for _ in numbers]
         labels: list[str] = []
@@ -91,7 +91,7 @@ def read(
     count = len(next(iter(values.values())))
     findings = _findings(flaws, tuple(numbers), block, layout, set(numbers.values()))
     findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
-    return [Table(tuple(located), values, contents(layout), count, tuple(labels), findings)]
+    return [RawTable(tuple(located), values, contents(layout), count, tuple(labels), findings)]
 
 
 def header(path: Path) -> tuple[Channel, ...]:
@@ -101,7 +101,7 @@ def header(path: Path) -> tuple[Channel, ...]:
     return _canonical(find_layout(lines, FileOptions(), path), lines, path)
 
 
-def peek(path: Path) -> list[Sample]:
+def peek(path: Path) -> list[FirstLook]:
     """Look at the first 2 MB of a text file; lines before the header are found out."""
     with path.open("rb") as file:
         head = next(blocks(file, path))
@@ -110,7 +110,7 @@ def peek(path: Path) -> list[Sample]:
     layout = layout.settled(head.lines[layout.first :])
     rows, _ = _line_by_line(head.after(layout.first), layout, tuple(range(layout.width)))
     names = (*layout.header, *repeat("", layout.width))[: layout.width] if layout.header else ()
-    return [Sample(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))]
+    return [FirstLook(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))]
 
 
 def _leading(lines: list[str], path: Path) -> int:
@@ -126,7 +126,7 @@ def _leading(lines: list[str], path: Path) -> int:
 
 
 def locate(
-    channels: tuple[Channel, ...] | None, layout: Layout, lines: list[str], path: Path
+    channels: tuple[Channel, ...] | None, layout: TextLayout, lines: list[str], path: Path
 ) -> dict[Channel, int]:
     """Number of the column of each channel that a text file holds.
 
@@ -137,7 +137,7 @@ def locate(
     return {channel: index for channel in wanted if (index := _index(channel, layout, path)) is not None}
 
 
-def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, ...]:
+def _canonical(layout: TextLayout, lines: list[str], path: Path) -> tuple[Channel, ...]:
     """The channels a canonical header names; columns of other names are none of ours."""
     where = f"{path}: line {layout.header_line}"
     if not layout.header:
@@ -150,7 +150,7 @@ def _canonical(layout: Layout, lines: list[str], path: Path) -> tuple[Channel, .
     return canonical(((index, title, None) for index, title in enumerate(layout.header)), where)
 
 
-def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
+def _index(channel: Channel, layout: TextLayout, path: Path) -> int | None:
     """Number of the column a channel comes from, None if this file has none such."""
     match channel.origin:
         case int(number):
@@ -167,14 +167,14 @@ def _index(channel: Channel, layout: Layout, path: Path) -> int | None:
             return None
 
 
-def contents(layout: Layout) -> str:
+def contents(layout: TextLayout) -> str:
     """The contents of the file in words."""
     if not layout.header:
         return f"{layout.width} columns without a header"
     return f"columns {counted_names([shortened(name) for name in layout.header], 20)}"
 
 
-def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
+def _gone_through(block: Block, layout: TextLayout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
     """All rows (n, k) of a block by compiled code, those lines apart that hold other than plain numbers."""
     from inercal.foundation.records.read.plain_rows import plain_rows
 
@@ -208,7 +208,7 @@ def _gone_through(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
     return np.concatenate(pieces), flaws
 
 
-def _looked_at(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
+def _looked_at(block: Block, layout: TextLayout, indices: tuple[int, ...]) -> tuple[Array, list[_Flaws]]:
     """All rows (n, k) of a block, by NumPy where it can."""
     rows = _at_once(block, layout, indices)
     if rows is not None:
@@ -217,7 +217,7 @@ def _looked_at(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[
     return rows, [flaw]
 
 
-def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | None:
+def _at_once(block: Block, layout: TextLayout, indices: tuple[int, ...]) -> Array | None:
     """All rows (n, k) of a block; None if any line is other than full of numbers."""
     lines, delimiter = block.lines, layout.delimiter
     if delimiter is None:
@@ -237,7 +237,7 @@ def _at_once(block: Block, layout: Layout, indices: tuple[int, ...]) -> Array | 
     return rows if len(rows) == len(lines) and (np.abs(rows) < LARGEST).all() else None
 
 
-def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tuple[Array, _Flaws]:
+def _line_by_line(block: Block, layout: TextLayout, indices: tuple[int, ...]) -> tuple[Array, _Flaws]:
     """All rows (n, k) of a block, NaN where there is no number, and where that is."""
     rows = np.full((len(block.lines), len(indices)), np.nan)
     lines: list[int] = []
@@ -258,7 +258,7 @@ def _line_by_line(block: Block, layout: Layout, indices: tuple[int, ...]) -> tup
     return rows, _Flaws(badly, tuple(place[column] for column in empty.T))
 
 
-def _rounded(block: Block, layout: Layout, index: int, values: Array) -> list[int]:
+def _rounded(block: Block, layout: TextLayout, index: int, values: Array) -> list[int]:
     """Numbers of the lines where the whole number in a column, read as ``values`` (rows of the block,), was rounded."""
     far = np.flatnonzero(np.abs(values) >= 2.0**53)
     if not far.size:
@@ -271,13 +271,13 @@ def _rounded(block: Block, layout: Layout, index: int, values: Array) -> list[in
     ]  # fmt: skip
 
 
-def _labels(block: Block, layout: Layout, index: int) -> list[str]:
+def _labels(block: Block, layout: TextLayout, index: int) -> list[str]:
     """The text of the label column, one for each row."""
     rows = (layout.fields(line) for line in block.lines if layout.is_row(line))
     return [sys.intern(fields[index].strip()) if fields else "" for fields in rows]
 
 
-def _cut(last: Block, layout: Layout) -> str:
+def _cut(last: Block, layout: TextLayout) -> str:
     """The last number of a block that does not end with a line end, if it may have had more digits; else nothing."""
     *before, line = last.lines[-_LAYOUT_LINES:]
     fields = layout.fields(line) if layout.is_row(line) else None
@@ -288,7 +288,7 @@ def _cut(last: Block, layout: Layout) -> str:
 
 
 def _findings(
-    flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, layout: Layout, indices: Collection[int]
+    flaws: Iterable[_Flaws], names: tuple[str, ...], last: Block, layout: TextLayout, indices: Collection[int]
 ) -> tuple[Finding, ...]:
     """Findings on rows that cannot be read, and on a file that ends too soon."""
     bad = np.concatenate([_NO_LINES, *(flaw.bad for flaw in flaws)])

@@ -12,7 +12,7 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import Channel
 from inercal.foundation.records.read.arrays import Contents, held, tables
 from inercal.foundation.records.read.layout import blocks, find_layout
-from inercal.foundation.records.read.table import FileOptions, Table
+from inercal.foundation.records.read.table import FileOptions, RawTable
 from inercal.foundation.records.read.text import UNENDED
 
 
@@ -21,7 +21,7 @@ def read(
     options: FileOptions,
     channels: tuple[Channel, ...] | None,
     progress: Callable[[int], None],
-) -> list[Table]:
+) -> list[RawTable]:
     """Read the wanted lines as columns; a line may begin with a name, by which the map then finds it.
 
     Raises `RecordError` where the lines have no numbers, or not equally many.

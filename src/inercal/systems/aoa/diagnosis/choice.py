@@ -35,9 +35,9 @@ from inercal.systems.aoa.diagnosis.spectrum import (
     with_offsets,
 )
 from inercal.systems.aoa.fusion import band as limiting
-from inercal.systems.aoa.fusion.filter_result import FilterResult
+from inercal.systems.aoa.fusion.filter_result import FusionResult
 from inercal.systems.aoa.fusion.loop import OUTPUTS
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
@@ -246,7 +246,7 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
     return findings
 
 
-def of_delay(delay: Delay | None, problem: FilterProblem, filtered: FilterResult) -> list[Finding]:
+def of_delay(delay: Delay | None, problem: FusionProblem, filtered: FusionResult) -> list[Finding]:
     """``command_shift``: a delay that costs more than u and that nobody stated. It is the gyro's, by the spectra, where
     the fusion does not learn it, for it may not go far from the study's; or that of the accelerometers, and so of the
     angle, where the gyro comes before them.
@@ -337,7 +337,7 @@ def _bands(part: Recording, settings: AoaSettings) -> Iterator[Band]:
             yield band
 
 
-def _nis(of: FilterProblem, part: Recording) -> float:
+def _nis(of: FusionProblem, part: Recording) -> float:
     """Mean squared innovation after the filter has settled, each as far as the gate lets it through."""
     part, of = limiting.fused(part, of)
     t, rows = part.t, part.rows

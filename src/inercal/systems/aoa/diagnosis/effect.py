@@ -19,15 +19,15 @@ from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.geometry.rotations import principal
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.diagnosis.fit_quality import stretch
-from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.filter_result import FusionResult, estimate
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings
 
 
 @dataclass(frozen=True)
-class Effect:
+class AngleEffect:
     """Rms ``shift`` of the angle [rad], its median ``u`` [rad] and the rms of ``lack`` over u, after the settling time;
     ``nis`` the mean squared innovation with the change."""
 
@@ -47,7 +47,7 @@ class Effect:
         return EVERYTHING if self.lack > 1.0 else ()
 
 
-def effect(plain: FilterResult, off: FilterResult, t: np.ndarray) -> Effect | None:
+def effect(plain: FusionResult, off: FusionResult, t: np.ndarray) -> AngleEffect | None:
     """The effect of a change on rows at ``t`` (n,) [s]; None where either has no angle."""
     known = np.isfinite(plain.u) & np.isfinite(off.theta) & (t - t[:1] >= LIMITS.settling_time)
     if not known.any():
@@ -56,11 +56,11 @@ def effect(plain: FilterResult, off: FilterResult, t: np.ndarray) -> Effect | No
     before, after = np.square(plain.u[known]), np.square(off.u[known])
     lack = (shift + np.maximum(after - before, 0.0)) / before
     root = float(np.sqrt(shift.mean()))
-    return Effect(root, float(np.median(plain.u[known])), float(np.sqrt(lack.mean())), off.nis_mean)
+    return AngleEffect(root, float(np.median(plain.u[known])), float(np.sqrt(lack.mean())), off.nis_mean)
 
 
 def of_flexure(
-    recording: Recording, problem: FilterProblem, filtered: FilterResult, settings: AoaSettings
+    recording: Recording, problem: FusionProblem, filtered: FusionResult, settings: AoaSettings
 ) -> list[Finding]:
     """``flexure``: a sting that shakes the model by more than half of what the prior allows, with what the angle would
     be if that were twice as large as what is found; nothing where the recording asked for a wide one."""
@@ -88,7 +88,7 @@ def of_flexure(
 
 
 def of_noise(
-    part: Recording, plain: FilterProblem, fair: FilterProblem, noise: list[Finding]
+    part: Recording, plain: FusionProblem, fair: FusionProblem, noise: list[Finding]
 ) -> list[Finding]:
     """Findings on noise, those on too much of it with what it does to the angle of a stretch."""
     if not any(each.harm for each in noise):
@@ -102,7 +102,7 @@ def of_noise(
     ]
 
 
-def _flexure(problem: FilterProblem, filtered: FilterResult) -> float:
+def _flexure(problem: FusionProblem, filtered: FusionResult) -> float:
     """Rms [m/s^2] of the flexure that a filter found, in the direction that has more; 0 where it is not estimated."""
     at = [k for k, name in enumerate(problem.names) if name.startswith("flexure_")]
     if not at or not len(filtered.kept_t):
@@ -112,7 +112,7 @@ def _flexure(problem: FilterProblem, filtered: FilterResult) -> float:
     return float(np.sqrt(np.mean(np.square(rows), axis=0)).max()) if len(rows) else 0.0
 
 
-def _more_flexible(problem: FilterProblem, times: float) -> FilterProblem:
+def _more_flexible(problem: FusionProblem, times: float) -> FusionProblem:
     """The problem with so many times the flexure."""
     constants, covariance = problem.constants, problem.covariance.copy()
     res = problem.places.resonators

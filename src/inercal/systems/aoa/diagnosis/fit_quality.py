@@ -13,8 +13,8 @@ from inercal.foundation.records.checks.values import outlying
 from inercal.systems.aoa.estimators import States
 from inercal.systems.aoa.fusion.band import fused_case
 from inercal.systems.aoa.fusion.loop import OUTPUTS
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
-from inercal.systems.aoa.fusion.run import State, advance, initial
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
+from inercal.systems.aoa.fusion.run import FusionState, advance, initial
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, in_time, later
 from inercal.systems.aoa.settings import AoaSettings
@@ -155,7 +155,7 @@ def _together(off: Array, prior: Array, posterior: Array) -> float:
     return float(squares.sum() / chdtri(seen.sum(), LIMITS.prior_chance)) if seen.any() else 0.0
 
 
-def _followed(posed: FilterProblem, t: Array, rows: Array) -> tuple[State, Array]:
+def _followed(posed: FusionProblem, t: Array, rows: Array) -> tuple[FusionState, Array]:
     """The state after rows, and the outputs of the fusion (m, OUTPUTS + N + 1).
 
     A filter that loses the angle every few rows is given up, as a new start takes the time of a hundred steps: NaN from

@@ -21,7 +21,7 @@ from inercal.systems.aoa.diagnosis.effect import effect
 from inercal.systems.aoa.diagnosis.fit_quality import Case, judged
 from inercal.systems.aoa.diagnosis.small import beside_a_scale
 from inercal.systems.aoa.fusion.filter_result import estimate
-from inercal.systems.aoa.fusion.problem import FilterProblem, problem
+from inercal.systems.aoa.fusion.problem import FusionProblem, problem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings, Prior
@@ -30,7 +30,7 @@ _WIDER = 10.0
 """Times the prior's standard deviation under which a recording speaks for itself."""
 
 
-class Scale(NamedTuple):
+class GyroScale(NamedTuple):
     """Error of the gyro's scale [1] by a recording alone, with its standard uncertainty; what it is off by from the
     prior, and the standard deviation of that."""
 
@@ -45,7 +45,7 @@ class Scale(NamedTuple):
         return abs(self.off) / self.apart
 
 
-def alone(part: Recording, of: FilterProblem) -> Scale | None:
+def alone(part: Recording, of: FusionProblem) -> GyroScale | None:
     """The scale that a stretch shows by itself; None where it shows none."""
     k = of.places.scale
     if k < 0 or not of.covariance[k, k] > 0.0 or not np.isfinite(part.gyro).any():
@@ -57,10 +57,10 @@ def alone(part: Recording, of: FilterProblem) -> Scale | None:
         return None
     own = 1.0 / (1.0 / variance - 1.0 / wide)
     value = own * (float(state.x[k]) / variance - mean / wide)
-    return Scale(value, math.sqrt(own), value - mean, math.sqrt(prior + own))
+    return GyroScale(value, math.sqrt(own), value - mean, math.sqrt(prior + own))
 
 
-def _wider(of: FilterProblem) -> FilterProblem:
+def _wider(of: FusionProblem) -> FusionProblem:
     """The problem with a wider prior of the scale."""
     k, covariance = of.places.scale, of.covariance.copy()
     variance = _WIDER**2 * covariance[k, k]
@@ -107,7 +107,9 @@ def _harms(error: Fitted[Case], part: Recording, settings: AoaSettings) -> bool:
     return bool((np.abs(error.values) > CLEAR * error.u).all()) and cost is not None and bool(cost.harm)
 
 
-def of_prior(part: Recording, of: FilterProblem, settings: AoaSettings, found: Scale | None) -> list[Finding]:
+def of_prior(
+    part: Recording, of: FusionProblem, settings: AoaSettings, found: GyroScale | None
+) -> list[Finding]:
     """``prior_suspect``: the scale that a stretch shows contradicts the prior, and the angle would be another one; or
     what explains it better."""
     if found is None or not found.sigmas > LIMITS.other_scale_sigmas:

@@ -14,12 +14,12 @@ import numpy as np
 
 from inercal.foundation.findings import Finding
 from inercal.foundation.units import STANDARD_GRAVITY
-from inercal.systems.aoa.diagnosis.effect import Effect, effect
+from inercal.systems.aoa.diagnosis.effect import AngleEffect, effect
 from inercal.systems.aoa.diagnosis.fit_quality import fit_quality, judged, stretch
-from inercal.systems.aoa.diagnosis.gyro_scale import Scale, alone, of_prior
+from inercal.systems.aoa.diagnosis.gyro_scale import GyroScale, alone, of_prior
 from inercal.systems.aoa.diagnosis.small import with_axis
-from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.filter_result import FusionResult, estimate
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.problem import problem as posed
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
@@ -30,7 +30,7 @@ UNSEEN_AXIS = math.radians(0.05)
 
 
 def unseen(
-    recording: Recording, problem: FilterProblem, settings: AoaSettings, named: bool = False
+    recording: Recording, problem: FusionProblem, settings: AoaSettings, named: bool = False
 ) -> list[Finding]:
     """``prior_suspect`` where the gyro's scale contradicts its prior, or what explains that better, unless other errors
     than noise are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed.
@@ -47,7 +47,7 @@ def unseen(
     return found if named else [*found, *_axis(recording, settings)]
 
 
-def _told(part: Recording, off: Recording, problem: FilterProblem, plain: FilterResult) -> Effect | None:
+def _told(part: Recording, off: Recording, problem: FusionProblem, plain: FusionResult) -> AngleEffect | None:
     """The effect of a fault in a stretch; None where it is small, or noticed."""
     found = effect(plain, estimate(off, problem), part.t)
     if found is None or found.nis > LIMITS.mean_nis or not found.ratio > LIMITS.unseen_sigmas:
@@ -55,7 +55,9 @@ def _told(part: Recording, off: Recording, problem: FilterProblem, plain: Filter
     return found
 
 
-def _scale(part: Recording, problem: FilterProblem, plain: FilterResult, own: Scale | None) -> list[Finding]:
+def _scale(
+    part: Recording, problem: FusionProblem, plain: FusionResult, own: GyroScale | None
+) -> list[Finding]:
     """The gyro's scale."""
     if not np.isfinite(part.gyro).any():
         return []
@@ -68,12 +70,12 @@ def _scale(part: Recording, problem: FilterProblem, plain: FilterResult, own: Sc
     return [_weak(what, found.shift, found, "Verify it, or state a wider gyro_scale under [prior].")]
 
 
-def _drift(part: Recording, problem: FilterProblem, plain: FilterResult) -> list[Finding]:
+def _drift(part: Recording, problem: FusionProblem, plain: FusionResult) -> list[Finding]:
     """The bias of the accelerometer whose drift shifts the angle most."""
     if problem.constants.accelerometer_walk > 0.0 or len(part.t) < 2:
         return []
     course = LIMITS.unseen_drift * (part.t - part.t[0]) / (part.t[-1] - part.t[0])
-    worst: tuple[float, str, Effect] | None = None
+    worst: tuple[float, str, AngleEffect] | None = None
     for k, name in enumerate(problem.layout.names):
         acc = part.acc.copy()
         acc[:, k] += course
@@ -93,7 +95,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     part, settings = judged(recording, settings)
     as_stated = fit_quality(part, settings).misfit
     plain = estimate(part, posed(settings, part.spatial))
-    worst: tuple[float, str, Effect] | None = None
+    worst: tuple[float, str, AngleEffect] | None = None
     for k, name in enumerate(settings.layout.names):
         for size in (UNSEEN_AXIS, -UNSEEN_AXIS):  # it may be off already, and back is no error
             turned = with_axis(settings, k, size)
@@ -110,7 +112,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     return [_weak(what, shift, found, "Fit the axes to a reference angle, or move through more angles.")]
 
 
-def _weak(fault: str, shift: float, found: Effect, action: str) -> Finding:
+def _weak(fault: str, shift: float, found: AngleEffect, action: str) -> Finding:
     """``weak_test``: a fault that shifts the angle by ``shift`` [rad], unnoticed."""
     size = f"{math.degrees(shift):.2g} deg ({found.ratio:.2g} u)"
     return Finding(

@@ -10,12 +10,12 @@ from inercal.faces.report.html import Picture
 from inercal.faces.report.marks import Axis, Dots, Level, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS
-from inercal.systems.aoa.design import Compared
+from inercal.systems.aoa.design import ComparedLayouts
 from inercal.systems.aoa.figures.sensors import side_view
 from inercal.systems.aoa.settings import AoaSettings
 
 
-def main(compared: Compared, settings: AoaSettings) -> Picture:
+def main(compared: ComparedLayouts, settings: AoaSettings) -> Picture:
     """U of the angle by each layout, and the wanted u."""
     wanted, names = settings.goal.theta, [bound.name for bound in compared.bounds]
     rows = np.arange(len(names))
@@ -41,7 +41,7 @@ def main(compared: Compared, settings: AoaSettings) -> Picture:
     )
 
 
-def pictures(compared: Compared, settings: AoaSettings) -> list[Picture]:
+def pictures(compared: ComparedLayouts, settings: AoaSettings) -> list[Picture]:
     """Layouts side by side, and the side view of each."""
     views = [
         side_view(

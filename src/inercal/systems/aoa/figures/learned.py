@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.report import innovations as white_noise
-from inercal.faces.report.courses import Course, converging, falling
+from inercal.faces.report.courses import CoefficientCourse, converging, falling
 from inercal.faces.report.html import Picture
 from inercal.faces.report.over_time import Marks, Signals, largest, middle, over_time, rms
 from inercal.foundation.arrays import Array
@@ -23,7 +23,7 @@ from inercal.systems.aoa.reading.recording import settled
 from inercal.systems.aoa.result.outcome import term_of
 
 if TYPE_CHECKING:
-    from inercal.systems.aoa.fusion.filter_result import FilterResult
+    from inercal.systems.aoa.fusion.filter_result import FusionResult
     from inercal.systems.aoa.settings import AoaSettings
     from inercal.systems.aoa.task import Measurement
 
@@ -72,7 +72,7 @@ def lever_arms(seen: Measurement, settings: AoaSettings, marks: Marks) -> list[P
     ]
 
 
-def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, marks: Marks) -> list[Picture]:
+def flexure(seen: Measurement, filtered: FusionResult, settings: AoaSettings, marks: Marks) -> list[Picture]:
     """The sting's flexure as it was estimated; nothing where it is not."""
     names, prior = seen.problem.names, settings.prior
     if "flexure_z" not in names or len(filtered.kept_t) < 2:
@@ -101,7 +101,7 @@ def flexure(seen: Measurement, filtered: FilterResult, settings: AoaSettings, ma
     ]
 
 
-def coefficients(seen: Measurement, filtered: FilterResult) -> list[Picture]:
+def coefficients(seen: Measurement, filtered: FusionResult) -> list[Picture]:
     """Biases, lever arms, heights and scale: at the end against their priors, and over time."""
     problem, t = seen.problem, filtered.kept_t
     if len(t) < 2:
@@ -116,7 +116,7 @@ def coefficients(seen: Measurement, filtered: FilterResult) -> list[Picture]:
     for (name, k), unit, size in zip(problem.nuisances.items(), units, sizes, strict=True):
         value, u = filtered.states[:, k] / size, filtered.states_u[:, k] / size
         centre = float(problem.mean[k] / size)
-        courses.append(Course(name, unit, value, u, float(prior[k] / size), centre=centre))
+        courses.append(CoefficientCourse(name, unit, value, u, float(prior[k] / size), centre=centre))
     last = filtered.states[finite[-1], places] / sizes, filtered.states_u[finite[-1], places] / sizes
     at_end = sensors.learned(
         tuple(problem.nuisances), units, *last, problem.mean[places] / sizes, prior[places] / sizes

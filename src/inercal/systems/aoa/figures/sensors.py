@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from inercal.faces.report.coefficients import limits
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Arrows, Axis, Band, Dots, Level, Line, Mark, Note, Panel
+from inercal.faces.report.marks import Area, Arrows, Axis, Dots, Level, Line, Mark, Note, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
@@ -43,7 +43,7 @@ def side_view(
     girth = (0.13 + float(np.max(np.abs(up), initial=0.0)) / shown) * shown * np.sin(turn)
     colours = [COLOURS[k % len(COLOURS)] for k in range(len(names))]
     marks: list[Mark] = [
-        Band(along[:31], -girth[:31], girth[:31], alpha=0.08),
+        Area(along[:31], -girth[:31], girth[:31], alpha=0.08),
         Line([1.6 * tail, 0.0], [0.0, 0.0], "", "#D0D4D7", 4.0),
         Dots([0.0], [0.0], "", INK, "+", 11.0),
         Note((0.0, 0.0), "pivot", INK, 7.0, "center", "bottom", (0.0, -13.0)),

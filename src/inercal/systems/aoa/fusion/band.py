@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from inercal.foundation._jit import kernel
 from inercal.systems.aoa.band import WHOLE, Band
 from inercal.systems.aoa.fusion.loop import BESIDE
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.problem import problem as problem_of
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later, usual_step
@@ -147,7 +147,7 @@ def zero_phase(of: BandFilter, t: Array, rows: Array) -> Fused:
     return Fused(fused_t, backward.rows[::-1][chosen], np.searchsorted(fused_t, t, side="right") - 1)
 
 
-def fused(recording: Recording, problem: FilterProblem) -> tuple[Recording, FilterProblem]:
+def fused(recording: Recording, problem: FusionProblem) -> tuple[Recording, FusionProblem]:
     """The rows of a recording that are fused, causally limited to the problem's band, and the problem for these."""
     of = filter_of(problem.band)
     if of is None:

@@ -25,8 +25,8 @@ from inercal.systems.aoa.fusion import band
 from inercal.systems.aoa.fusion.ahead import between, carried_on
 from inercal.systems.aoa.fusion.band import BandFilter
 from inercal.systems.aoa.fusion.loop import MOTION, NO_MOTIONS, OUTPUTS
-from inercal.systems.aoa.fusion.problem import FilterProblem
-from inercal.systems.aoa.fusion.run import Start, State, Trace, advance, initial
+from inercal.systems.aoa.fusion.problem import FusionProblem
+from inercal.systems.aoa.fusion.run import FilterStart, FusionState, FusionTrace, advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later
@@ -42,7 +42,7 @@ _BLOCK = 10_000
 
 
 @dataclass(frozen=True, eq=False)
-class FilterResult:
+class FusionResult:
     """Result of the fusion of n rows, causal or ``smoothed``; NaN in rows that were left out.
 
     ``theta``, ``u`` [rad], ``rate``, ``rate_u`` [rad/s] with standard uncertainties and ``acceleration`` [rad/s^2];
@@ -64,7 +64,7 @@ class FilterResult:
     kept_t: Array
     states: Array
     states_u: Array
-    state: State
+    state: FusionState
     nis_mean: float
     nis_count: int
     starts: tuple[int, ...]
@@ -75,8 +75,8 @@ class FilterResult:
 
 
 def estimate(
-    recording: Recording, problem: FilterProblem, smoothed: bool = False, where: object = "t"
-) -> FilterResult:
+    recording: Recording, problem: FusionProblem, smoothed: bool = False, where: object = "t"
+) -> FusionResult:
     """Angles of a recording, causal or from all of it; raises `RecordError` where time does not go on."""
     clock = time.perf_counter()
     if (of := band.filter_of(problem.band)) is not None:
@@ -85,8 +85,8 @@ def estimate(
 
 
 def _limited(
-    recording: Recording, problem: FilterProblem, of: BandFilter, smoothed: bool, where: object
-) -> FilterResult:
+    recording: Recording, problem: FusionProblem, of: BandFilter, smoothed: bool, where: object
+) -> FusionResult:
     """The angles of a recording that is limited to a band: of the rows that are fused, carried on to all."""
     taken = later(recording.t, where=where)
     t, rows = recording.t[taken], recording.rows[taken]
@@ -132,8 +132,8 @@ def _limited(
 
 
 def _estimate(
-    recording: Recording, problem: FilterProblem, smoothed: bool, where: object, motions: Array
-) -> FilterResult:
+    recording: Recording, problem: FusionProblem, smoothed: bool, where: object, motions: Array
+) -> FusionResult:
     """Angles of a recording without a band; ``motions`` as of `inercal.systems.aoa.fusion.run.advance`."""
     clock = time.perf_counter()
     taken = later(recording.t, where=where)
@@ -160,7 +160,7 @@ def _estimate(
         motion, innovations = _at(taken, len(recording.t), angles), _at(taken, len(recording.t), innovations)
         rolls = None if rolls is None else _at(taken, len(recording.t), rolls)
     m = problem.size
-    return FilterResult(
+    return FusionResult(
         theta=motion[:, 0],
         u=motion[:, 1],
         rate=motion[:, 2],
@@ -199,21 +199,21 @@ def _without_spikes(innovations: Array, gate: float) -> tuple[float, int]:
     return float(np.sum(squared if finite.all() else squared[finite])), int(finite.sum())
 
 
-def roll_of(problem: FilterProblem, kept: Array) -> Array:
+def roll_of(problem: FusionProblem, kept: Array) -> Array:
     """Roll, in (-pi, pi], and its standard uncertainty (k, 2) [rad] from kept states (k, 2 m)."""
     k = problem.places.roll
     return np.column_stack([principal(kept[:, k]), kept[:, problem.size + k]])
 
 
 def _causal(
-    recording: Recording, problem: FilterProblem, kept: Array, every: int, motions: Array
-) -> tuple[State, Trace, Array | None]:
+    recording: Recording, problem: FusionProblem, kept: Array, every: int, motions: Array
+) -> tuple[FusionState, FusionTrace, Array | None]:
     """The causal filter's state and trace, and roll (n, 2) where it is tracked; ``kept`` as of `advance`.
 
     Rows, and where the roll is tracked all states, are held for some rows at a time: else they would fill the memory.
     """
     state, done, t = initial(problem), 0, recording.t
-    starts: list[Start] = []
+    starts: list[FilterStart] = []
     out = np.empty((len(t), OUTPUTS + problem.count + 1))
     rolls = np.empty((len(t), 2)) if problem.spatial else None
     for a in range(0, max(1, len(t)), _BLOCK):
@@ -230,7 +230,7 @@ def _causal(
         starts += [each._replace(row=each.row + done) for each in trace.starts]
         out[done : done + len(trace.out)] = trace.out
         done += len(trace.out)
-    return state, Trace(out[:done], tuple(starts)), rolls
+    return state, FusionTrace(out[:done], tuple(starts)), rolls
 
 
 def fusion_label(smoothed: bool, states: int) -> str:
@@ -238,7 +238,7 @@ def fusion_label(smoothed: bool, states: int) -> str:
     return f"{'smoothed' if smoothed else 'fusion'} {states}"
 
 
-def of_fusion(filtered: FilterResult, states: int) -> Angles:
+def of_fusion(filtered: FusionResult, states: int) -> Angles:
     """The angles of the fusion, named by its ``states``."""
     return Angles(
         fusion_label(filtered.smoothed, states), filtered.theta, filtered.u, filtered.rate, filtered.rate_u
@@ -246,7 +246,7 @@ def of_fusion(filtered: FilterResult, states: int) -> Angles:
 
 
 def tracked_roll(
-    recording: Recording, problem: FilterProblem, filtered: FilterResult
+    recording: Recording, problem: FusionProblem, filtered: FusionResult
 ) -> tuple[Array, Array] | None:
     """Roll (n,) and its standard uncertainty (n,) [rad] at each row, NaN where theta is; None where it is not tracked.
 

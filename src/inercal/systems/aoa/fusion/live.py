@@ -18,8 +18,8 @@ from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion import loop
 from inercal.systems.aoa.fusion import run as fusion
 from inercal.systems.aoa.fusion.filter_result import roll_of
-from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, KeptStates, MeasurementRows
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later, set_back
 
@@ -31,7 +31,7 @@ class LiveState(NamedTuple):
     ``late`` the number of successive rows at the end that are not later than those before.
     """
 
-    fusion: fusion.State
+    fusion: fusion.FusionState
     waiting: Array
     late: int
 
@@ -70,14 +70,14 @@ class Live:
     ...     answers = live.feed(t, readings)
     """
 
-    def __init__(self, problem: FilterProblem, state: LiveState | None = None, where: object = "t") -> None:
+    def __init__(self, problem: FusionProblem, state: LiveState | None = None, where: object = "t") -> None:
         self._problem, self._where = problem, where
         state = LiveState(fusion.initial(problem), np.empty(0), 0) if state is None else state
         self._fusion, self._waiting, self._late = _apart(state.fusion), state.waiting, state.late
         self._dt, self._row = np.empty(1), np.empty((1, problem.count + BESIDE))
         self._out = np.empty((1, OUTPUTS + problem.count + 1))
         self._kept = np.empty((int(problem.spatial), 2 * problem.size))
-        rows, kept = Rows(self._dt, self._row), Kept(self._kept, 1, 0)
+        rows, kept = MeasurementRows(self._dt, self._row), KeptStates(self._kept, 1, 0)
         self._arguments = rows, problem.model, self._out, kept, loop.NONE, loop.NO_MOTIONS
         belief = Belief(self._fusion.x, self._fusion.P, self._fusion.turns)
         self._advance = compiled(loop._advance, belief, *self._arguments)
@@ -111,7 +111,7 @@ class Live:
             self._fusion = state._replace(started=False, held=np.column_stack([stamp, row]))
             self._waiting = stamp
             return Answers(stamp[:0], self._out[:0], self._roll(self._kept[:0]))
-        self._fusion = fusion.State(state.x, state.P, state.turns, t, True, state.held, state.since)
+        self._fusion = fusion.FusionState(state.x, state.P, state.turns, t, True, state.held, state.since)
         return Answers(stamp, self._out.copy(), self._roll(self._kept))
 
     @property
@@ -170,13 +170,13 @@ class Live:
         return rest
 
 
-def load_kernels(problem: FilterProblem) -> None:
+def load_kernels(problem: FusionProblem) -> None:
     """Load, or compile, the kernels of the causal fusion."""
     belief = Belief(problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3))
-    rows = Rows(np.empty(0), np.empty((0, problem.count + BESIDE)))
+    rows = MeasurementRows(np.empty(0), np.empty((0, problem.count + BESIDE)))
     loop.advance(belief, rows, problem.model, np.empty((0, OUTPUTS + problem.count + 1)))
 
 
-def _apart(state: fusion.State) -> fusion.State:
+def _apart(state: fusion.FusionState) -> fusion.FusionState:
     """The same state in arrays of its own."""
     return state._replace(x=state.x.copy(), P=state.P.copy(), turns=state.turns.copy())

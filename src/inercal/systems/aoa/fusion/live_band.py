@@ -20,7 +20,7 @@ from inercal.systems.aoa.fusion.ahead import carried_on
 from inercal.systems.aoa.fusion.band import BandState
 from inercal.systems.aoa.fusion.live import Answers, Live, LiveState
 from inercal.systems.aoa.fusion.loop import BESIDE, MOTION, OUTPUTS
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.watch import watched
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import set_back
@@ -44,7 +44,7 @@ class LimitedLive:
     """As `inercal.systems.aoa.fusion.live.Live`, for a problem with or without a band."""
 
     def __init__(
-        self, problem: FilterProblem, state: LimitedState | None = None, where: object = "t"
+        self, problem: FusionProblem, state: LimitedState | None = None, where: object = "t"
     ) -> None:
         self._problem, self._where = problem, where
         self._filter = band.filter_of(problem.band)
@@ -113,7 +113,7 @@ class LimitedLive:
             raise set_back(self._where, late, self._state.t, t)
 
 
-def load_kernels(problem: FilterProblem) -> None:
+def load_kernels(problem: FusionProblem) -> None:
     """Load, or compile, the kernels of the causal fusion, with a band or without."""
     live.load_kernels(problem)
     row = np.full((1, problem.count + BESIDE + 1), np.nan)

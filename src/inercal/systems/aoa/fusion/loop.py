@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation._jit import allocating, kernel
-from inercal.foundation.inference.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import SlopeRow, empty_row
 from inercal.systems.aoa.fusion.model import (
     WIDEST,
     Constants,
-    Model,
+    FusionModel,
+    FusionStep,
     Places,
     Prediction,
-    Step,
     accelerometer,
     gyro,
     transition,
@@ -67,7 +67,7 @@ class Belief(NamedTuple):
     turns: Array
 
 
-class Rows(NamedTuple):
+class MeasurementRows(NamedTuple):
     """Rows of measurements: ``dt`` (m,) [s] since the row before; ``z`` (m, N + 5) the accelerometers [m/s^2], the gyro
     [rad/s], a stated angle and its standard uncertainty [rad], roll and yaw gyros [rad/s]; NaN where not measured."""
 
@@ -75,7 +75,7 @@ class Rows(NamedTuple):
     z: Array
 
 
-class Kept(NamedTuple):
+class KeptStates(NamedTuple):
     """States kept for pictures: ``states`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
     counted from ``first``; none with 0 rows."""
 
@@ -84,7 +84,7 @@ class Kept(NamedTuple):
     first: int
 
 
-NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
+NOT_KEPT = KeptStates(np.empty((0, 0)), 1, 0)
 
 NO_MOTIONS = np.empty((0, MOTION))
 
@@ -152,7 +152,7 @@ def congruent(P: Array, moving: Indices, F: Array, Q: Array, work: Array) -> Non
 
 
 @kernel
-def go_on(belief: Belief, step: Step, model: Model, F: Array, Q: Array, work: Array) -> None:
+def go_on(belief: Belief, step: FusionStep, model: FusionModel, F: Array, Q: Array, work: Array) -> None:
     """The state and its covariance after a step."""
     x, P, moving, roll = belief.x, belief.P, model.places.moving, model.places.roll
     d, theta, phi = len(F), 0.0, 0.0
@@ -172,7 +172,7 @@ def go_on(belief: Belief, step: Step, model: Model, F: Array, Q: Array, work: Ar
 
 @kernel
 def update(
-    P: Array, x: Array, row: Row, size: int, v: float, noise: float, gate: float, work: Array
+    P: Array, x: Array, row: SlopeRow, size: int, v: float, noise: float, gate: float, work: Array
 ) -> tuple[float, float]:
     """Update by one scalar, in place: innovation ``v``, of variance h P h^T + ``noise`` = S, with h the ``row``.
 
@@ -207,7 +207,9 @@ def update(
 
 
 @kernel
-def reading(i: int, at: Prediction, angle_u: float, model: Model, out: Row) -> tuple[float, float, int]:
+def reading(
+    i: int, at: Prediction, angle_u: float, model: FusionModel, out: SlopeRow
+) -> tuple[float, float, int]:
     """Reading of scalar ``i`` of a row of measurements at a prediction, its variance, and its entries in ``out``.
 
     ``angle_u`` [rad] is the standard uncertainty of a stated angle; ``out`` receives the derivatives by the state.
@@ -235,7 +237,7 @@ def significant(value: float, variance: float) -> float:
 
 
 @kernel
-def believed(row: Row, size: int, places: Places, of_rate: float, of_acceleration: float) -> None:
+def believed(row: SlopeRow, size: int, places: Places, of_rate: float, of_acceleration: float) -> None:
     """Remove from a row the derivatives by positions and by the gyro's scale and delay where the motion is only noise.
 
     They multiply rate and acceleration. At rest the filter would learn them from noise, and be sure of wrong values.
@@ -275,7 +277,7 @@ def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
 
 
 @kernel
-def moving(x: Array, P: Array, p: float, y: float, model: Model, out: Array) -> None:
+def moving(x: Array, P: Array, p: float, y: float, model: FusionModel, out: Array) -> None:
     """Put theta, rate, acceleration and jerk into ``out`` (`MOTION`,), their covariance, cosine of the roll and rate of
     theta by yaw, the roll, its u and its rate; ``p``, ``y`` are indications of the roll and yaw gyros."""
     roll = model.places.roll
@@ -293,10 +295,10 @@ def moving(x: Array, P: Array, p: float, y: float, model: Model, out: Array) -> 
 
 def advance(
     belief: Belief,
-    rows: Rows,
-    model: Model,
+    rows: MeasurementRows,
+    model: FusionModel,
     out: Array,
-    kept: Kept = NOT_KEPT,
+    kept: KeptStates = NOT_KEPT,
     memory: Memory = NONE,
     motions: Array = NO_MOTIONS,
 ) -> int:
@@ -314,7 +316,13 @@ def advance(
 
 @allocating
 def _advance(
-    belief: Belief, rows: Rows, model: Model, out: Array, kept: Kept, memory: Memory, motions: Array
+    belief: Belief,
+    rows: MeasurementRows,
+    model: FusionModel,
+    out: Array,
+    kept: KeptStates,
+    memory: Memory,
+    motions: Array,
 ) -> int:
     """The loop of `advance`."""
     x, P, turns = belief
@@ -341,7 +349,7 @@ def _advance(
         of_rate = significant(rate, min(P[1, 1], constants.gyro_noise))  # P of a start is no noise
         of_acceleration = significant(acceleration, P[2, 2])
         if dt > 0.0:
-            go_on(belief, Step(dt, p, y, snap), model, F, Q, work)
+            go_on(belief, FusionStep(dt, p, y, snap), model, F, Q, work)
         if surprised or not (P[0, 0] < LOST and abs(x[0]) < _TURNS):
             return k
         if spatial:

@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.aoa.band import WHOLE, Band
-from inercal.systems.aoa.fusion.model import BIASES, Constants, Model, Places
+from inercal.systems.aoa.fusion.model import BIASES, Constants, FusionModel, Places
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.settings import AoaSettings
 
@@ -23,12 +23,12 @@ _ROLL_U = math.radians(0.1)
 
 
 @dataclass(frozen=True, eq=False)
-class FilterProblem:
+class FusionProblem:
     """The problem of the fusion, without the recording.
 
     ``names`` (n,) of the states; ``mean`` (n,) and ``covariance`` (n, n) of all but the four of motion, which have none
-    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.systems.aoa.fusion.model.Model`, the
-    noise that of a fused row; ``band`` of the sensors before.
+    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.systems.aoa.fusion.model.FusionModel`,
+    the noise that of a fused row; ``band`` of the sensors before.
     """
 
     layout: Layout
@@ -41,9 +41,9 @@ class FilterProblem:
     band: Band = WHOLE
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> FusionModel:
         """Geometry, places and constants, for kernels."""
-        return Model(self.geometry, self.places, self.constants)
+        return FusionModel(self.geometry, self.places, self.constants)
 
     @property
     def count(self) -> int:
@@ -77,7 +77,7 @@ def problem(
     settings: AoaSettings,
     spatial: bool = False,
     posterior: tuple[Mapping[str, float], Mapping[tuple[str, str], float]] | None = None,
-) -> FilterProblem:
+) -> FusionProblem:
     """The problem of a study.
 
     ``spatial``: the recording has gyros for roll and yaw. ``posterior``: values of coefficients by name, and their
@@ -130,7 +130,7 @@ def problem(
     # of the vibration of this recording, which no earlier run knows
     biases = np.arange(BIASES, BIASES + n)
     covariance[biases, biases] += prior.rectified**2
-    return FilterProblem(
+    return FusionProblem(
         layout, tuple(names), mean, covariance, places, _constants(settings), layout.geometry, settings.band
     )
 

@@ -26,16 +26,16 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.aoa.fusion import loop
-from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, Kept, Rows
+from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, KeptStates, MeasurementRows
 from inercal.systems.aoa.fusion.model import GYRO_BIAS
-from inercal.systems.aoa.fusion.problem import START, FilterProblem
+from inercal.systems.aoa.fusion.problem import START, FusionProblem
 from inercal.systems.aoa.limits import LIMITS
 
 _STEP = LIMITS.fading_interval
 _FIRST = math.floor(LIMITS.memory_time / _STEP)
 
 
-class State(NamedTuple):
+class FusionState(NamedTuple):
     """State of the filter between two rows.
 
     ``x`` (n,) and ``P`` (n, n) of the states of the problem; ``turns`` (N + 3,) as of
@@ -53,7 +53,7 @@ class State(NamedTuple):
     since: float
 
 
-class Start(NamedTuple):
+class FilterStart(NamedTuple):
     """A start of the filter: the ``row``, counted in the trace, the state before the update of that row, ``anew`` where
     all of it is of the prior, as at first and after surprises without end, and ``since`` [s] the row from which it has
     learned."""
@@ -75,25 +75,25 @@ class Head(NamedTuple):
     F: Array | None
 
 
-class Trace(NamedTuple):
+class FusionTrace(NamedTuple):
     """Estimates of the filter at m rows: ``out`` (m, OUTPUTS + N + 1) as of `inercal.systems.aoa.fusion.loop.advance`,
     its ``starts``, and the ``heads`` of blocks where they were asked for."""
 
     out: Array
-    starts: tuple[Start, ...]
+    starts: tuple[FilterStart, ...]
     heads: tuple[Head, ...] = ()
 
 
-def initial(problem: FilterProblem) -> State:
+def initial(problem: FusionProblem) -> FusionState:
     """Before the first row."""
     none = np.empty((0, problem.count + BESIDE + 1))
     x, P = problem.mean.copy(), problem.covariance.copy()
-    return State(x, P, np.zeros(problem.count + 3), -math.inf, False, none, math.nan)
+    return FusionState(x, P, np.zeros(problem.count + 3), -math.inf, False, none, math.nan)
 
 
 def advance(
-    state: State,
-    problem: FilterProblem,
+    state: FusionState,
+    problem: FusionProblem,
     t: Array,
     rows: Array,
     kept: Array | None = None,
@@ -102,7 +102,7 @@ def advance(
     motions: Array = loop.NO_MOTIONS,
     block: int = 0,
     first: int = 0,
-) -> tuple[State, Trace]:
+) -> tuple[FusionState, FusionTrace]:
     """Go on by rows at the times ``t`` (m,) [s], increasing; ``rows`` (m, N + 5) as of
     `inercal.systems.aoa.fusion.loop.advance`.
 
@@ -134,14 +134,14 @@ def advance(
                 at = end
                 continue
             since = float(t[at]) if anew or math.isnan(since) else since
-            starts.append(Start(at, x.copy(), P.copy(), turns.copy(), anew, since))
+            starts.append(FilterStart(at, x.copy(), P.copy(), turns.copy(), anew, since))
             dt[at] = 0.0
         elif steps := fading_steps(float(t[at - 1]) if at else earlier, float(t[at]), since):
             F = fade(x, P, problem, steps)
         stop = next_fading(t, at, since)
         stop = min(stop, at + block) if block else stop
-        part = Rows(dt[at:stop], rows[at:stop])
-        belief, keep = Belief(x, P, turns), Kept(kept, every, first + at)
+        part = MeasurementRows(dt[at:stop], rows[at:stop])
+        belief, keep = Belief(x, P, turns), KeptStates(kept, every, first + at)
         before = _apart(belief) if block else belief
         done = loop.advance(belief, part, problem.model, out[at:stop], keep, motions=motions[at:stop])
         if block:
@@ -150,7 +150,9 @@ def advance(
         at, running = (at + done, at + done == stop) if done or running else (end, False)
     latest = float(t[at - 1]) if at else earlier
     held = np.column_stack([t[at:], rows[at:]])
-    return State(x, P, turns, latest, running, held, since), Trace(out[:at], tuple(starts), tuple(heads))
+    return FusionState(x, P, turns, latest, running, held, since), FusionTrace(
+        out[:at], tuple(starts), tuple(heads)
+    )
 
 
 def _apart(belief: Belief) -> Belief:
@@ -158,14 +160,14 @@ def _apart(belief: Belief) -> Belief:
     return Belief(*(each.copy() for each in belief))
 
 
-def unknown(problem: FilterProblem) -> list[int]:
+def unknown(problem: FusionProblem) -> list[int]:
     """Places of the states that a start finds anew: motion, flexure of the sting, and roll."""
     flexure, roll = problem.places.resonators, problem.places.roll
     of_flexure = range(flexure, flexure + 4) if flexure >= 0 else ()
     return [0, 1, 2, 3, *of_flexure, *((roll,) if roll >= 0 else ())]
 
 
-def start(x: Array, P: Array, turns: Array, problem: FilterProblem, t: Array, rows: Array) -> bool:
+def start(x: Array, P: Array, turns: Array, problem: FusionProblem, t: Array, rows: Array) -> bool:
     """Put the motion at the first of a few rows into ``x`` and ``P``; False where these show no angle.
 
     Theta fits the medians of the accelerometers best, the rate is the gyro's or, without one, the slope of theta, and
@@ -219,7 +221,7 @@ def _medians(rows: Array) -> Array:
     return np.asarray(0.5 * (middle[0] + middle[1]))
 
 
-def _angle(force: Array, level: float, problem: FilterProblem) -> float:
+def _angle(force: Array, level: float, problem: FusionProblem) -> float:
     """Theta that forward and upward specific force (2,) show at rest; NaN where they are."""
     forward, up = force.tolist()
     if abs(level) > LIMITS.level_cosine:
@@ -254,7 +256,7 @@ def next_fading(t: Array, at: int, since: float) -> int:
     return k
 
 
-def fade(x: Array, P: Array, problem: FilterProblem, steps: int) -> Array:
+def fade(x: Array, P: Array, problem: FusionProblem, steps: int) -> Array:
     """Let the constants of the state ``x`` (n,), ``P`` (n, n) fade by so many steps, in place.
 
     Returns F (n, n) of x' = F x + the part of the prior. Of the other states what is known given the constants stays.

@@ -26,16 +26,16 @@ from inercal.systems.aoa.fusion.loop import (
     NOT_KEPT,
     OUTPUTS,
     Belief,
-    Kept,
+    KeptStates,
+    MeasurementRows,
     Memory,
-    Rows,
     congruent,
     root,
     write,
 )
-from inercal.systems.aoa.fusion.model import Model
-from inercal.systems.aoa.fusion.problem import FilterProblem
-from inercal.systems.aoa.fusion.run import Head, Trace, unknown
+from inercal.systems.aoa.fusion.model import FusionModel
+from inercal.systems.aoa.fusion.problem import FusionProblem
+from inercal.systems.aoa.fusion.run import FusionTrace, Head, unknown
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -44,7 +44,12 @@ BLOCK = 256
 
 
 def smooth(
-    problem: FilterProblem, t: Array, rows: Array, trace: Trace, kept: Array | None = None, every: int = 1
+    problem: FusionProblem,
+    t: Array,
+    rows: Array,
+    trace: FusionTrace,
+    kept: Array | None = None,
+    every: int = 1,
 ) -> Array:
     """Angles from all rows: (m, 5) theta, u [rad], rate, u [rad/s], acceleration [rad/s^2].
 
@@ -65,8 +70,8 @@ def smooth(
     causal = np.empty((longest, OUTPUTS + problem.count + 1))
     for block, before, F in reversed(trace.heads):
         belief = Belief(*(each.copy() for each in before))
-        done = loop.advance(belief, Rows(dt[block], rows[block]), model, causal, memory=memory)
-        _backward(lam, Lam, memory, done, model, out[block], Kept(states, every, block.start))
+        done = loop.advance(belief, MeasurementRows(dt[block], rows[block]), model, causal, memory=memory)
+        _backward(lam, Lam, memory, done, model, out[block], KeptStates(states, every, block.start))
         if F is not None:
             with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
                 lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
@@ -78,17 +83,17 @@ def smooth(
     return out
 
 
-def load_kernels(problem: FilterProblem) -> None:
+def load_kernels(problem: FusionProblem) -> None:
     """Load, or compile, the kernels."""
     x, P = problem.mean.copy(), problem.covariance.copy()
     head = Head(slice(0, 1), Belief(x, P, np.zeros(problem.count + 3)), None)
     none = np.full((1, problem.count + loop.BESIDE), np.nan)
-    smooth(problem, np.zeros(1), none, Trace(np.empty((1, 0)), (), (head,)))
+    smooth(problem, np.zeros(1), none, FusionTrace(np.empty((1, 0)), (), (head,)))
 
 
 @allocating
 def _backward(
-    lam: Array, Lam: Array, memory: Memory, size: int, model: Model, out: Array, kept: Kept
+    lam: Array, Lam: Array, memory: Memory, size: int, model: FusionModel, out: Array, kept: KeptStates
 ) -> None:
     """Go back over ``size`` rows that the filter remembers: ``lam`` and ``Lam`` from their end to their beginning."""
     steps, after, scalars = memory

@@ -18,7 +18,7 @@ from inercal.systems.aoa.angles import continuous
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, in_time, later
-from inercal.systems.aoa.settings import GYROS, AoaSettings, Calibration
+from inercal.systems.aoa.settings import GYROS, AoaSettings, SensorCalibration
 
 Flags = NDArray[np.bool_]
 
@@ -53,7 +53,7 @@ def recording_of(record: Record, settings: AoaSettings) -> Recording:
         )
         raise RecordError(where, text)
     usable_interval(float(np.median(np.diff(t[in_time(t, where)]))), where)
-    rows = _Rows(record, settings, t, where)
+    rows = _SensorRows(record, settings, t, where)
     gyros = [name for name in GYROS if name in record and _speaks(record[name], settings)]
     values = {name: rows.calibrated(name) for name in (*there, *gyros)}
     measured = [*names, GYROS[0]]
@@ -97,7 +97,7 @@ def _speaks(column: Column, settings: AoaSettings) -> bool:
     return bool(np.isfinite(column.values).any()) and not (noise > 0.0 and is_dead(column.values))
 
 
-class _Rows:
+class _SensorRows:
     """Columns of a record on the rows of its accelerometers, at ``t``; ``findings`` on them are collected."""
 
     def __init__(self, record: Record, settings: AoaSettings, t: Array, where: str) -> None:
@@ -205,7 +205,7 @@ def _findings_of(record: Record, lost: dict[str, tuple[Flags, Flags]]) -> list[F
     ]
 
 
-def _left_out(name: str, out: Flags, stuck: Flags, how: Calibration) -> list[Finding]:
+def _left_out(name: str, out: Flags, stuck: Flags, how: SensorCalibration) -> list[Finding]:
     """Findings on the samples of a sensor that are left out."""
     extreme = "at an extreme where it stays"
     at_end = extreme if how.range is None else f"at or beyond the range, or {extreme}"
@@ -267,7 +267,7 @@ def of_sensors(there: list[str], gyros: list[str], record: Record, settings: Aoa
     return findings
 
 
-def check_unit(column: Column, how: Calibration, where: object) -> None:
+def check_unit(column: Column, how: SensorCalibration, where: object) -> None:
     """Raise `RecordError` for a column in volts or counts without a scale for these, or such a scale for another."""
     holds = _PER.get(column.unit.dimension, "1")
     if holds == how.per:
@@ -289,7 +289,7 @@ def indication(column: Column, values: Array) -> Array:
     return indicated
 
 
-def at_range(indicated: Array, measured: Array, how: Calibration) -> Flags:
+def at_range(indicated: Array, measured: Array, how: SensorCalibration) -> Flags:
     """Mask (m,) of samples at or beyond the range, ``measured`` or, in a column of physical units, ``indicated``.
 
     An output in physical units ends at its range before its bias is taken off; either way it is at an end. With a zero

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.budget import BudgetItem
 from inercal.systems.aoa.fusion.band import fused
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.problem import problem as stated_problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
@@ -58,7 +58,7 @@ class BudgetSource:
 
 
 @dataclass(frozen=True, eq=False)
-class VarianceParts:
+class AngleVariances:
     """Variances by source.
 
     ``budget`` has the share of each coefficient's variance at the end, and of that of `ANGLE`, its mean after the first
@@ -73,8 +73,8 @@ class VarianceParts:
 
 
 def parts(
-    recording: Recording, problem: FilterProblem, settings: AoaSettings, smoothed: bool, answered: Mask
-) -> VarianceParts:
+    recording: Recording, problem: FusionProblem, settings: AoaSettings, smoothed: bool, answered: Mask
+) -> AngleVariances:
     """Split the uncertainty of the fusion by source.
 
     ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``answered`` (n,) marks
@@ -121,10 +121,10 @@ def parts(
     common = np.zeros((len(at), len(at)))
     for _, shift in shifts:
         common += np.outer(shift[1:], shift[1:])
-    return VarianceParts(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
+    return AngleVariances(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
-def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource, ...]:
+def sources(problem: FusionProblem, settings: AoaSettings) -> tuple[BudgetSource, ...]:
     """All sources that a problem has, but for gravity and a stated roll."""
     noise, prior, timing = settings.noise, settings.prior, settings.timing
     before = _known_before(problem, settings)
@@ -178,7 +178,7 @@ def sources(problem: FilterProblem, settings: AoaSettings) -> tuple[BudgetSource
     )
 
 
-def _known_before(problem: FilterProblem, settings: AoaSettings) -> tuple[str, ...]:
+def _known_before(problem: FusionProblem, settings: AoaSettings) -> tuple[str, ...]:
     """States whose prior is of an earlier run, not of the study."""
     usual = stated_problem(settings, problem.spatial).covariance
     return tuple(
@@ -189,7 +189,7 @@ def _known_before(problem: FilterProblem, settings: AoaSettings) -> tuple[str, .
 
 
 def _run(
-    problem: FilterProblem, t: Array, rows: Array, smoothed: bool, judged: Mask
+    problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask
 ) -> tuple[float, Array, Array, Array]:
     """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
     state, trace = advance(initial(problem), problem, t, rows, last=True, block=BLOCK if smoothed else 0)
@@ -198,7 +198,7 @@ def _run(
     return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
 
 
-def _enlarged(problem: FilterProblem, rows: Array, source: BudgetSource) -> tuple[FilterProblem, Array]:
+def _enlarged(problem: FusionProblem, rows: Array, source: BudgetSource) -> tuple[FusionProblem, Array]:
     """The problem and its rows with the variance of a source larger by `_STEP`."""
     by = 1.0 + _STEP
     constants, covariance = problem.constants, problem.covariance.copy()

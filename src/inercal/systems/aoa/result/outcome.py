@@ -18,8 +18,8 @@ from inercal.foundation.results.basis import Basis, Formula, conditions_of, stud
 from inercal.foundation.results.budget import Uncertainty
 from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles
-from inercal.systems.aoa.fusion.filter_result import FilterResult
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.filter_result import FusionResult
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, in_time
 from inercal.systems.aoa.reference.corrections import as_stated, report_of
@@ -73,8 +73,8 @@ _OF_FUSION = (
 def assemble(
     recording: Recording,
     settings: AoaSettings,
-    problem: FilterProblem,
-    filtered: FilterResult,
+    problem: FusionProblem,
+    filtered: FusionResult,
     findings: Sequence[Finding],
     delay: Delay | None,
     points: Iterable[Point] = (),

@@ -20,8 +20,8 @@ from inercal.foundation.geometry.rotations import principal
 from inercal.foundation.results.files import load as load_estimate
 from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.angles import Angles, stated_roll
-from inercal.systems.aoa.fusion.filter_result import FilterResult, estimate, of_fusion, tracked_roll
-from inercal.systems.aoa.fusion.problem import FilterProblem
+from inercal.systems.aoa.fusion.filter_result import FusionResult, estimate, of_fusion, tracked_roll
+from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.watch import watched
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.methods import measure
@@ -58,7 +58,7 @@ def leans(settings: AoaSettings, tracked: bool) -> tuple[Lean, ...]:
     return tuple(inputs)
 
 
-def leaning(problem: FilterProblem, lean: Lean, settings: AoaSettings) -> FilterProblem:
+def leaning(problem: FusionProblem, lean: Lean, settings: AoaSettings) -> FusionProblem:
     """The problem of the fusion under a change, which also moves the coefficients of an earlier run."""
     constants = problem.constants._replace(gravity=float(lean.gravity), roll_cosine=math.cos(lean.roll))
     mean = problem.mean.copy()
@@ -84,7 +84,7 @@ def carried(earlier: Estimate, settings: AoaSettings) -> dict[str, float]:
 
 
 def by_fusion(
-    recording: Recording, settings: AoaSettings, problem: FilterProblem, filtered: FilterResult
+    recording: Recording, settings: AoaSettings, problem: FusionProblem, filtered: FusionResult
 ) -> Angles:
     """The angles of the fusion, with the roll where gyros track it; stated inputs count in their uncertainty."""
     nis = watched(recording.t, filtered.innovations, problem.constants.gate)

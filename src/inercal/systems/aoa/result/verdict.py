@@ -14,14 +14,14 @@ from inercal.foundation.inference.factor import NEGATIVE
 from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.aoa.angles import Angles
-from inercal.systems.aoa.fusion.filter_result import FilterResult
+from inercal.systems.aoa.fusion.filter_result import FusionResult
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings
 
 
 def of_fusion(
-    recording: Recording, filtered: FilterResult, angles: Angles, findings: Sequence[Finding]
+    recording: Recording, filtered: FusionResult, angles: Angles, findings: Sequence[Finding]
 ) -> tuple[Status, str]:
     """Status and sentence of a result of the fusion, by all its findings.
 
@@ -77,7 +77,7 @@ def is_covariance(P: Array) -> bool:
     return bool(np.isfinite(correlation).all() and np.linalg.eigvalsh(correlation)[0] >= NEGATIVE)
 
 
-def _lost(recording: Recording, filtered: FilterResult) -> str | None:
+def _lost(recording: Recording, filtered: FusionResult) -> str | None:
     """A sentence on a filter that lost the angle too often; None otherwise."""
     if len(filtered.starts) <= LIMITS.losses:
         return None

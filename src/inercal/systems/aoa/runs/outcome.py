@@ -16,7 +16,7 @@ from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import Table, heads, rounded, short
 from inercal.systems.aoa.result.outcome import COMMAND, REFERENCES
 from inercal.systems.aoa.runs.run_table import Run, RunTable
-from inercal.systems.aoa.runs.summary import AtPoint, Oscillation
+from inercal.systems.aoa.runs.summary import AtPoint, OscillationRuns
 from inercal.systems.aoa.settings import AoaSettings
 
 MODEL = (
@@ -38,7 +38,7 @@ def assemble(
     table: RunTable,
     measured: Sequence[tuple[Run, Estimate, str]],
     at_points: Sequence[AtPoint],
-    oscillating: Sequence[Oscillation],
+    oscillating: Sequence[OscillationRuns],
     findings: Sequence[Finding],
     settings: AoaSettings,
 ) -> Estimate:

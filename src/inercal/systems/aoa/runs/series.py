@@ -37,7 +37,7 @@ from inercal.systems.aoa.result.carry_over import posterior_of
 from inercal.systems.aoa.result.columns import points_record
 from inercal.systems.aoa.runs.outcome import assemble
 from inercal.systems.aoa.runs.run_table import Run, RunTable
-from inercal.systems.aoa.runs.summary import AtPoint, Oscillation, by_point, oscillations
+from inercal.systems.aoa.runs.summary import AtPoint, OscillationRuns, by_point, oscillations
 from inercal.systems.aoa.settings import GYROS, AoaSettings, Zero
 from inercal.systems.aoa.task import Measurement
 
@@ -121,7 +121,7 @@ class Series:
     estimate: Estimate
     measured: tuple[MeasuredRun, ...]
     at_points: tuple[AtPoint, ...]
-    oscillating: tuple[Oscillation, ...]
+    oscillating: tuple[OscillationRuns, ...]
 
 
 def measure_runs(

@@ -38,7 +38,7 @@ class AtPoint:
 
 
 @dataclass(frozen=True)
-class Oscillation:
+class OscillationRuns:
     """Runs of one ``amplitude`` [rad] and ``frequency`` [Hz] of a sine: their number, and error terms as angles [rad].
 
     ``terms``: what each way of the paper leaves of the centrifugal and tangential terms in closed form, at the stated
@@ -110,7 +110,7 @@ def _together(points: Sequence[tuple[Role, Point]]) -> AtPoint:
     )
 
 
-def oscillations(runs: Sequence[tuple[Run, Measurement]]) -> tuple[Oscillation, ...]:
+def oscillations(runs: Sequence[tuple[Run, Measurement]]) -> tuple[OscillationRuns, ...]:
     """The runs that oscillate, repeats together, by amplitude and frequency: as stated in the table, or as measured."""
     groups: list[list[tuple[float, float, Measurement]]] = []
     for run, measured in runs:
@@ -129,7 +129,7 @@ def oscillations(runs: Sequence[tuple[Run, Measurement]]) -> tuple[Oscillation, 
     return tuple(sorted(found, key=lambda each: (each.amplitude, each.frequency)))
 
 
-def _oscillation(group: Sequence[tuple[float, float, Measurement]]) -> Oscillation:
+def _oscillation(group: Sequence[tuple[float, float, Measurement]]) -> OscillationRuns:
     """Repeats of one oscillation."""
     amplitude = float(np.mean([each[0] for each in group]))
     frequency = float(np.mean([each[1] for each in group]))
@@ -140,7 +140,7 @@ def _oscillation(group: Sequence[tuple[float, float, Measurement]]) -> Oscillati
                 squares.setdefault(name, []).append(errors.all.rms**2)
     rms = {name: math.sqrt(float(np.mean(each))) for name, each in squares.items()}
     terms = error_terms(group[0][2].settings, amplitude, frequency)
-    return Oscillation(amplitude, frequency, len(group), terms, rms)
+    return OscillationRuns(amplitude, frequency, len(group), terms, rms)
 
 
 def error_terms(settings: AoaSettings, amplitude: float, frequency: float) -> dict[str, float]:

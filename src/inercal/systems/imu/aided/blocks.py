@@ -14,7 +14,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.geometry.rotations import skew
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.column import Triad
-from inercal.systems.imu.aided.table import Motion, forward
+from inercal.systems.imu.aided.table import TableMotion, forward
 from inercal.systems.imu.limits import LIMITS
 
 EDGE = 0.05
@@ -57,7 +57,7 @@ class Blocks:
         )
 
 
-def cut(triad: Triad, motion: Motion, rests: Array) -> Blocks:
+def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
     """Cut a triad into blocks of equally many samples, without those that lack samples or saturate.
 
     Raises
@@ -113,7 +113,7 @@ def _within(nodes: Array, rests: Array) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class BlockMotion:
     """Mean motion of the table in each block, for angles that come ``shift`` [s] late.
 
     ``rate`` (n, 3) [rad/s] mean rate of the table on the instrument's axes, without earth rate; ``C_bn`` (n, 3, 3)
@@ -129,7 +129,7 @@ class Reference:
     arm: Array
 
 
-def reference(blocks: Blocks, motion: Motion, shift: float) -> Reference:
+def reference(blocks: Blocks, motion: TableMotion, shift: float) -> BlockMotion:
     """The motion of the table in blocks.
 
     Angles, not rates, are integrated: noise of the encoders stays at the ends of a turn.
@@ -145,7 +145,7 @@ def reference(blocks: Blocks, motion: Motion, shift: float) -> Reference:
     C_slope = np.swapaxes(C_nodes[:, -1] - C_nodes[:, 0], -1, -2) / length[:, None, None]
     spin = skew(turn / np.diff(blocks.nodes, axis=1)[..., None])
     arm = skew(rate_slope) + (spin @ spin).mean(axis=1)
-    return Reference(shift, turn.sum(axis=1) / length[:, None], C_bn, rate_slope, C_slope, arm)
+    return BlockMotion(shift, turn.sum(axis=1) / length[:, None], C_bn, rate_slope, C_slope, arm)
 
 
 def small_turn(R: Array) -> Array:

@@ -36,9 +36,9 @@ from inercal.systems.imu.aided.coefficients import (
 from inercal.systems.imu.aided.diagnosis.examination import misfits
 from inercal.systems.imu.aided.diagnosis.fit_quality import knocks
 from inercal.systems.imu.aided.diagnosis.gross import agreement, cures, expected, lag, tells, travel
-from inercal.systems.imu.aided.fit import Fit, fit
+from inercal.systems.imu.aided.fit import AidedFit, fit
 from inercal.systems.imu.aided.model import side_of, unknowns
-from inercal.systems.imu.aided.table import Motion, motion_of, shifted, times, values_of
+from inercal.systems.imu.aided.table import TableMotion, motion_of, shifted, times, values_of
 from inercal.systems.imu.aided.verdict import findings, scatter, verdict
 from inercal.systems.imu.aided.walk import whiten
 from inercal.systems.imu.limits import LIMITS
@@ -66,9 +66,9 @@ REFERENCES = (
 
 def assemble(
     record: Record,
-    motion: Motion,
+    motion: TableMotion,
     rests: Array,
-    fit: Fit,
+    fit: AidedFit,
     lag: float,
     settings: ImuSettings,
     earlier: list[Finding],
@@ -144,7 +144,7 @@ def without_fit(
     )
 
 
-def _statistics(fit: Fit, rests: Array) -> dict[str, float]:
+def _statistics(fit: AidedFit, rests: Array) -> dict[str, float]:
     """Numbers about the fit."""
     statistics: dict[str, float] = {"rests": float(len(rests))}
     for triad, prefix in (("acc", ""), ("gyro", "gyro_")):
@@ -159,13 +159,13 @@ def _statistics(fit: Fit, rests: Array) -> dict[str, float]:
     return statistics
 
 
-def _with_u(fit: Fit, group: str, offset: float = 0.0) -> dict[str, list[float]]:
+def _with_u(fit: AidedFit, group: str, offset: float = 0.0) -> dict[str, list[float]]:
     """A group of unknowns with its standard uncertainties."""
     values = fit.x[fit.unknowns.places[group]] + offset
     return {"value": values.tolist(), "u": standard_uncertainty(fit, group).tolist()}
 
 
-def _noise(fit: Fit, triad: str) -> dict[str, list[float]]:
+def _noise(fit: AidedFit, triad: str) -> dict[str, list[float]]:
     """Levels of noise of the three sensors [output]."""
     levels = [sensor.noise for sensor in of_triad(fit, triad)]
     return {
@@ -176,7 +176,7 @@ def _noise(fit: Fit, triad: str) -> dict[str, list[float]]:
     }
 
 
-def rest_table(fit: Fit, motion: Motion, rests: Array) -> list[Mapping[str, Any]]:
+def rest_table(fit: AidedFit, motion: TableMotion, rests: Array) -> list[Mapping[str, Any]]:
     """One row for each rest: time, angles, and the mean residuals of the sensors."""
     rows: list[Mapping[str, Any]] = []
     for start, end in rests:
@@ -192,7 +192,7 @@ def rest_table(fit: Fit, motion: Motion, rests: Array) -> list[Mapping[str, Any]
     return rows
 
 
-def _conditions(record: Record, fit: Fit, settings: ImuSettings) -> dict[str, Any]:
+def _conditions(record: Record, fit: AidedFit, settings: ImuSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid, as recorded."""
     g = settings.site.gravity
     blocks = of_triad(fit, "acc")[0].side.blocks
@@ -213,9 +213,9 @@ class AidedCalibration:
     """An ``estimate``, the table's ``motion`` and ``rests`` (k, 2) [s], and the ``fit`` if there is one."""
 
     estimate: Estimate
-    motion: Motion
+    motion: TableMotion
     rests: Array
-    fit: Fit | None = None
+    fit: AidedFit | None = None
 
 
 def calibrate_aided(
@@ -297,7 +297,7 @@ def calibrate_aided(
         for each in blocks
     }
 
-    def fitted() -> Fit:
+    def fitted() -> AidedFit:
         sides = [side_of(each, motion, rests, layout) for each in blocks]
         return fit(sides, motion, layout, settings.site.gravity, names)
 
@@ -320,7 +320,7 @@ def _centred(record: Record, sensor: str) -> Triad:
     return replace(triad, t=triad.t - half) if half else triad
 
 
-def _contradiction(wrong: list[str], blocks: list[Blocks], motion: Motion) -> str:
+def _contradiction(wrong: list[str], blocks: list[Blocks], motion: TableMotion) -> str:
     """Outputs that do not follow the table, and what would make sense of them."""
     remedies = list(cures(blocks, motion))
     what = "check the order, signs and units of the angles and of the sensors' axes, and the mounting"

@@ -8,7 +8,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.foundation.results.budget import TypeA, TypeB
-from inercal.systems.imu.aided.fit import Fit, Sensor
+from inercal.systems.imu.aided.fit import AidedFit, Sensor
 from inercal.systems.imu.limits import LIMITS
 
 SQUARES = tuple(f"K2_{axis}" for axis in "xyz")
@@ -41,7 +41,7 @@ def circumstances_of(triads: tuple[str, ...]) -> tuple[str, ...]:
     return (*LEVER_ARMS, *(_DELAYS[triad] for triad in triads))
 
 
-def coefficients(fit: Fit, names: tuple[str, ...], lag: float) -> tuple[Array, Array, Array]:
+def coefficients(fit: AidedFit, names: tuple[str, ...], lag: float) -> tuple[Array, Array, Array]:
     """Values (p,), their derivatives (p, P) by the unknowns, and variances (p,) of their own.
 
     ``lag`` [s] is the time that the angles were taken earlier by before the fit.
@@ -86,7 +86,7 @@ def coefficients(fit: Fit, names: tuple[str, ...], lag: float) -> tuple[Array, A
     )
 
 
-def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[TypeA]:
+def type_a(fit: AidedFit, rows: Array, own: Array, names: tuple[str, ...]) -> list[TypeA]:
     """Uncertainties of the coefficients by noise in the data: white noise and wander of the biases, by triad.
 
     ``rows`` (p, n) derivatives of the coefficients ``names`` (p,) by the unknowns of the fit; ``own`` (p,) variance
@@ -126,7 +126,7 @@ def type_a(fit: Fit, rows: Array, own: Array, names: tuple[str, ...]) -> list[Ty
 
 
 def type_b(
-    fit: Fit, rows: Array, names: tuple[str, ...], values: Array, site: Site, clock_u: float
+    fit: AidedFit, rows: Array, names: tuple[str, ...], values: Array, site: Site, clock_u: float
 ) -> list[TypeB]:
     """Uncertainties of the coefficients by inputs: gravity, the clock, earth rate, the errors of the table.
 
@@ -158,12 +158,12 @@ def type_b(
     return sources
 
 
-def standard_uncertainty(fit: Fit, group: str) -> Array:
+def standard_uncertainty(fit: AidedFit, group: str) -> Array:
     """Standard uncertainties of a group of unknowns."""
     return np.asarray(np.sqrt(np.diag(fit.covariance)[fit.unknowns.places[group]]))
 
 
-def of_triad(fit: Fit, triad: str) -> list[Sensor]:
+def of_triad(fit: AidedFit, triad: str) -> list[Sensor]:
     """The three sensors of a triad."""
     return [sensor for sensor in fit.sensors if sensor.side.sensor == triad]
 

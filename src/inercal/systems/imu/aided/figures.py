@@ -16,7 +16,7 @@ from inercal.systems.imu.aided.coefficients import of_triad
 
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
-    from inercal.systems.imu.aided.fit import Fit
+    from inercal.systems.imu.aided.fit import AidedFit
 
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
@@ -49,7 +49,7 @@ def _test(calibration: AidedCalibration) -> Picture:
     )
 
 
-def _biases(fit: Fit, rests: Array, triad: str) -> Picture:
+def _biases(fit: AidedFit, rests: Array, triad: str) -> Picture:
     """Residuals of a triad, averaged over each rest and each turn, with what the noise explains."""
     sensors = of_triad(fit, triad)
     blocks = sensors[0].side.blocks

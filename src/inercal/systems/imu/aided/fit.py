@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import Identifiability, identify
 from inercal.foundation.inference.variances import Solved, degrees, weighed
-from inercal.systems.imu.aided.blocks import Reference, reference
+from inercal.systems.imu.aided.blocks import BlockMotion, reference
 from inercal.systems.imu.aided.model import Equation, Side, Unknowns, equations
-from inercal.systems.imu.aided.table import Motion
-from inercal.systems.imu.aided.walk import Whitened, whiten
+from inercal.systems.imu.aided.table import TableMotion
+from inercal.systems.imu.aided.walk import WhitenedColumns, whiten
 from inercal.systems.imu.limits import LIMITS
 
 Flags = NDArray[np.bool_]
@@ -183,7 +183,7 @@ class Sensor:
     side: Side
     equation: Equation
     noise: Levels
-    whitened: Whitened
+    whitened: WhitenedColumns
 
     @property
     def bias(self) -> float:
@@ -197,7 +197,7 @@ class Sensor:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class AidedFit:
     """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
 
     ``references`` by triad; ``identified`` by triad the identifiability of its gains on a perfect table.
@@ -207,18 +207,18 @@ class Fit:
     x: Array
     covariance: Array
     sensors: Sequence[Sensor]
-    references: Mapping[str, Reference]
+    references: Mapping[str, BlockMotion]
     identified: Mapping[str, Identifiability]
     converged: bool
 
 
 def fit(
     sides: Sequence[Side],
-    motion: Motion,
+    motion: TableMotion,
     layout: Unknowns,
     gravity: float,
     names: Mapping[str, tuple[str, ...]],
-) -> Fit:
+) -> AidedFit:
     """Fit all sensors.
 
     Parameters
@@ -269,7 +269,7 @@ def fit(
                     references[side.sensor] = reference(side.blocks, motion, shift)
     root = layout.sd[:, None] * inverse
     identified = {side.sensor: _identified(sensors, layout, side.sensor, names) for side in sides}
-    return Fit(layout, x, root @ root.T, sensors, references, identified, converged)
+    return AidedFit(layout, x, root @ root.T, sensors, references, identified, converged)
 
 
 def noise_of(
@@ -292,7 +292,7 @@ def noise_of(
     return levels(y, U[:, some] * s[some], prior, blocks.middle, blocks.length, blocks.resting, floor)
 
 
-def _whiten(side: Side, equation: Equation, level: Levels) -> Whitened:
+def _whiten(side: Side, equation: Equation, level: Levels) -> WhitenedColumns:
     """Whitened columns of a sensor, the residual last."""
     blocks = side.blocks
     columns = np.column_stack([equation.columns, equation.residual])

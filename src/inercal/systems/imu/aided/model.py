@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.rigs.chain import Scope
-from inercal.systems.imu.aided.blocks import Blocks, Reference
-from inercal.systems.imu.aided.table import Motion, error_nodes
+from inercal.systems.imu.aided.blocks import BlockMotion, Blocks
+from inercal.systems.imu.aided.table import TableMotion, error_nodes
 from inercal.systems.imu.settings import AidedSettings
 
 Indices = NDArray[np.int64]
@@ -133,7 +133,7 @@ class Side:
         return self.rate_errors + np.cross(rate[:, :, None], self.errors, axis=1)
 
 
-def side_of(blocks: Blocks, motion: Motion, rests: Array, layout: Unknowns) -> Side:
+def side_of(blocks: Blocks, motion: TableMotion, rests: Array, layout: Unknowns) -> Side:
     """Prepare a triad."""
     at = {
         k: _turns(motion, t, rests)
@@ -145,7 +145,7 @@ def side_of(blocks: Blocks, motion: Motion, rests: Array, layout: Unknowns) -> S
     return Side(blocks.triad.sensor, blocks, at[1], change, places)
 
 
-def _turns(motion: Motion, t: Array, rests: Array) -> Array:
+def _turns(motion: TableMotion, t: Array, rests: Array) -> Array:
     """(n, 3, Q): turn of the instrument by unit errors at times t."""
     parts = [nodes.slopes[:, :, None] * nodes.hats[:, None, :] for nodes in error_nodes(motion, t, rests)]
     return np.concatenate(parts, axis=-1) if parts else np.zeros((len(t), 3, 0))
@@ -160,7 +160,7 @@ class Equation:
     residual: Array
 
 
-def equations(side: Side, ref: Reference, layout: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
+def equations(side: Side, ref: BlockMotion, layout: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
     """The three sensors of a triad at unknowns ``x`` (P,)."""
     places = layout.places
     B = x[places[f"gain {side.sensor}"]].reshape(3, 3)

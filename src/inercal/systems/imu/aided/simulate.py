@@ -23,7 +23,7 @@ Program = Sequence[tuple[str, float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class AidedTruth:
     """An IMU and the circumstances of a test, in SI.
 
     ``white`` [output sqrt(s)] and ``walk`` [output/sqrt(s)] of (accelerometers, gyro); ``arms`` (3, 3) [m] places of
@@ -65,7 +65,7 @@ def rests_of(program: Program) -> Array:
 
 
 def simulate(
-    truth: Truth,
+    truth: AidedTruth,
     chain: Chain,
     program: Program,
     rng: np.random.Generator,
@@ -143,7 +143,7 @@ def simulate(
     return record_of(columns, t * (1.0 + disturbances.clock)), _values(truth, biases)
 
 
-def _values(truth: Truth, biases: Mapping[str, Array]) -> dict[str, float]:
+def _values(truth: AidedTruth, biases: Mapping[str, Array]) -> dict[str, float]:
     """True coefficients by symbol."""
     values: dict[str, float] = {}
     for sensor, model, (bias, scale, cross) in (
@@ -193,7 +193,7 @@ def simulate_study(settings: ImuSettings, options: AidedSettings, rng: np.random
     scales = [float(np.mean(model.scale)) for model in (imu.accelerometer, imu.gyro)]
     white = np.array([of.accelerometer_noise, of.gyro_noise]) * scales
     walk = np.array(list(walks)) * scales
-    truth = Truth(
+    truth = AidedTruth(
         imu.accelerometer,
         imu.gyro,
         site.gravity,

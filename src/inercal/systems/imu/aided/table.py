@@ -21,7 +21,7 @@ from inercal.systems.imu.limits import LIMITS
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class TableMotion:
     """Angles (m, joints) [rad] of the chain's joints at times ``t`` (m,) [s], without jumps at full turns.
 
     ``findings`` say which readings were left out.
@@ -74,7 +74,7 @@ class Motion:
         return spans[spans[:, 1] - spans[:, 0] >= LIMITS.shortest_rest]
 
 
-def motion_of(record: Record, chain: Chain) -> Motion:
+def motion_of(record: Record, chain: Chain) -> TableMotion:
     """The table's motion in a record.
 
     Raises
@@ -120,7 +120,7 @@ def motion_of(record: Record, chain: Chain) -> Motion:
             f"{chain.joints[joint]} jumps by {jump:.4g} deg at t {t[row]:.2f} s, expected the angles that the table "
             "passes through, as its encoders give them",
         )
-    return Motion(chain, t, angles, path, findings)
+    return TableMotion(chain, t, angles, path, findings)
 
 
 def forward(t: Array, name: str, path: str) -> NDArray[np.int64]:
@@ -187,7 +187,7 @@ class ErrorNodes:
     hats: Array
 
 
-def error_nodes(motion: Motion, t: Array, rests: Array) -> Iterator[ErrorNodes]:
+def error_nodes(motion: TableMotion, t: Array, rests: Array) -> Iterator[ErrorNodes]:
     """The errors of the table at times ``t`` (n,); offsets turn nothing and are left out."""
     chain = motion.chain
     if not chain.errors:
@@ -210,7 +210,7 @@ def error_nodes(motion: Motion, t: Array, rests: Array) -> Iterator[ErrorNodes]:
         yield ErrorNodes(error, vectors[:, k], hats)
 
 
-def values_of(motion: Motion, rests: Array) -> Mapping[str, Numbers]:
+def values_of(motion: TableMotion, rests: Array) -> Mapping[str, Numbers]:
     """Number (k,) of the value that each error of the table has in each rest (k, 2) [s], at least one rest.
 
     Offsets turn nothing and are left out, as is what is left to the scatter: errors of scope ``sample``.
@@ -224,6 +224,6 @@ def values_of(motion: Motion, rests: Array) -> Mapping[str, Numbers]:
     }
 
 
-def shifted(motion: Motion, by: float) -> Motion:
+def shifted(motion: TableMotion, by: float) -> TableMotion:
     """The motion ``by`` [s] later."""
     return replace(motion, t=motion.t + by)

@@ -15,7 +15,7 @@ from inercal.foundation.units import RAW
 from inercal.systems.imu.aided.coefficients import of_triad, standard_uncertainty
 from inercal.systems.imu.aided.diagnosis.examination import Misfit
 from inercal.systems.imu.aided.diagnosis.fit_quality import variation
-from inercal.systems.imu.aided.fit import Fit, Sensor
+from inercal.systems.imu.aided.fit import AidedFit, Sensor
 from inercal.systems.imu.limits import LIMITS
 
 _WORDS = {"acc": "accelerometers", "gyro": "gyro"}
@@ -27,7 +27,7 @@ _CURE = {
 
 
 def verdict(
-    fit: Fit, values: Mapping[str, float], u: Mapping[str, float], rests: int, faults: Sequence[Misfit]
+    fit: AidedFit, values: Mapping[str, float], u: Mapping[str, float], rests: int, faults: Sequence[Misfit]
 ) -> tuple[Status, str]:
     """Status and message.
 
@@ -88,7 +88,7 @@ def verdict(
     )
 
 
-def _cure(fit: Fit, triad: str) -> str:
+def _cure(fit: AidedFit, triad: str) -> str:
     """The remedy for a triad that the test leaves too uncertain."""
     clipped = of_triad(fit, triad)[0].side.blocks.clipped
     if clipped:
@@ -99,7 +99,7 @@ def _cure(fit: Fit, triad: str) -> str:
     return _CURE[triad]
 
 
-def _sensor_names(fit: Fit) -> list[str]:
+def _sensor_names(fit: AidedFit) -> list[str]:
     """Names of the sensors in the fit."""
     return [f"{sensor.side.sensor}_{'xyz'[k % 3]}" for k, sensor in enumerate(fit.sensors)]
 
@@ -117,7 +117,7 @@ def _shift(sensor: Sensor) -> float:
     return sensor.noise.walk_moving * float(np.sqrt(length[~resting].sum() / turns))
 
 
-def scatter(fit: Fit, gravity: float) -> float:
+def scatter(fit: AidedFit, gravity: float) -> float:
     """Angle [rad] that shifts of the accelerometers with each turn amount to; 0 where there are none."""
     sensors = of_triad(fit, "acc")
     scale = np.abs(np.diag(fit.x[fit.unknowns.places["gain acc"]].reshape(3, 3)))
@@ -135,7 +135,7 @@ def _relative(name: str, values: Mapping[str, float], u: Mapping[str, float]) ->
     return u[name] / abs(values[name]) if name.startswith(("K1", "S")) else u[name]
 
 
-def _least(fit: Fit, triad: str) -> str:
+def _least(fit: AidedFit, triad: str) -> str:
     """Along which axis the input varies least, in words."""
     blocks = of_triad(fit, triad)[0].side.blocks
     ref = fit.references[triad]
@@ -147,7 +147,7 @@ def _least(fit: Fit, triad: str) -> str:
     return f"the {_INPUT[triad]} {along} {'xyz'[axis]} varies by {size} rms only"
 
 
-def _unit_words(fit: Fit, triad: str) -> str:
+def _unit_words(fit: AidedFit, triad: str) -> str:
     """Findings about the unit of physical outputs, whose scale factors should be near nominal."""
     unit = of_triad(fit, triad)[0].side.blocks.triad.unit
     if unit.dimension in RAW:
@@ -163,7 +163,7 @@ def _unit_words(fit: Fit, triad: str) -> str:
 
 
 def findings(
-    fit: Fit, lag: float, faults: Sequence[Misfit], sound: bool, geometry: tuple[str, ...]
+    fit: AidedFit, lag: float, faults: Sequence[Misfit], sound: bool, geometry: tuple[str, ...]
 ) -> Iterator[Finding]:
     """Findings about clocks, biases, saturation, and faults in the residuals of a result, ``sound`` or not.
 

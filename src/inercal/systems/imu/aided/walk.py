@@ -74,7 +74,7 @@ def _backward(out: Array, size: Array, gain: Array, noise: Array, steps: Array) 
 
 
 @dataclass(frozen=True, eq=False)
-class Whitened:
+class WhitenedColumns:
     """Columns after whitening.
 
     ``rows`` (n, c); ``size`` (n,) the variances, the first infinite; ``mean`` (c,) the mean of the bias over the test
@@ -97,7 +97,7 @@ class Whitened:
         return (noise * self.white[:, None]).T @ noise, (steps * self.steps[:, None]).T @ steps
 
 
-def whiten(columns: Array, t: Array, white: Array, walk: float | Array) -> Whitened:
+def whiten(columns: Array, t: Array, white: Array, walk: float | Array) -> WhitenedColumns:
     """Whiten columns (n, c) at times ``t`` (n,) [s], for variances ``white`` (n,) and ``walk`` K [output/sqrt(s)].
 
     ``walk`` may be (n,): that of the time before each block.
@@ -109,4 +109,6 @@ def whiten(columns: Array, t: Array, white: Array, walk: float | Array) -> White
     integral = _forward(columns, gaps, white, squares, rows, size, gain)
     span = t[-1] - t[0]
     steps = np.append((squares * gaps)[1:], 0.0)
-    return Whitened(rows, size, integral[:-1] / span, float(integral[-1]) / span**2, gain, white, steps)
+    return WhitenedColumns(
+        rows, size, integral[:-1] / span, float(integral[-1]) / span**2, gain, white, steps
+    )

@@ -24,7 +24,7 @@ from inercal.systems.imu.ferraris.gravity_transfer import is_recorded
 from inercal.systems.imu.ferraris.method import Matrices, matrices
 from inercal.systems.imu.ferraris.names import POSITIONS
 from inercal.systems.imu.ferraris.outcome import assemble, without_sections
-from inercal.systems.imu.ferraris.readings import Readings, read_sections
+from inercal.systems.imu.ferraris.readings import SectionReadings, read_sections
 from inercal.systems.imu.ferraris.scatter import Scatter, judge
 from inercal.systems.imu.ferraris.sections import Sections, find_sections
 from inercal.systems.imu.ferraris.uncertainty import propagation
@@ -84,7 +84,7 @@ class FerrarisCalibration:
     accelerometer: Triad
     gyro: Triad
     sections: Sections
-    readings: Readings | None = None
+    readings: SectionReadings | None = None
     solution: Matrices | None = None
     scatter: Scatter | None = None
 

@@ -22,7 +22,7 @@ from inercal.foundation.records.dwells import (
     window_samples,
     windowed_variance,
 )
-from inercal.systems.imu.ferraris.motions import Level, Motion, motions, part
+from inercal.systems.imu.ferraris.motions import AccelerometerLevel, SectionMotion, motions, part
 from inercal.systems.imu.ferraris.names import POSITIONS, UP
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import on_other_clock
@@ -35,7 +35,7 @@ class Detected:
 
     holds: tuple[Dwell, ...]
     positions: dict[str, tuple[int, int]]
-    motions: tuple[Motion, ...]
+    motions: tuple[SectionMotion, ...]
 
 
 def detect(acc: Triad, gyro: Triad) -> Detected:
@@ -43,7 +43,7 @@ def detect(acc: Triad, gyro: Triad) -> Detected:
     holds = _holds(acc, gyro)
     if not holds:
         return Detected((), {}, ())
-    level = Level.of(acc, holds)
+    level = AccelerometerLevel.of(acc, holds)
     bias = np.mean([np.nanmean(part(gyro, acc, hold.start, hold.stop)[1], axis=0) for hold in holds], axis=0)
     candidates = motions(acc, gyro, holds, level, bias, _cuts(acc))
     return Detected(holds, _positions(acc, holds, level), tuple(candidates))
@@ -71,7 +71,7 @@ def _calm(variance: Array) -> NDArray[np.bool_]:
     )
 
 
-def _positions(acc: Triad, holds: tuple[Dwell, ...], level: Level) -> dict[str, tuple[int, int]]:
+def _positions(acc: Triad, holds: tuple[Dwell, ...], level: AccelerometerLevel) -> dict[str, tuple[int, int]]:
     """The hold of each position: of several, those of the two positions of an axis that are nearest in time.
 
     Biases that wander then drop out of their difference.

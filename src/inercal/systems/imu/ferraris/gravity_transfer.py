@@ -71,7 +71,7 @@ def carry(acc: Triad, gyro: Triad, detected: Detected) -> Carried:
     ways = cut_turns(gyro.t, gyro.values, force, spans)
     guesses = [(*first_guess(ways, f, at_rest.rate_bias, sign * np.eye(3)), sign) for sign in (1.0, -1.0)]
     scale, _, sign = min(guesses, key=lambda guess: guess[1])
-    problem = _Problem(ways, f, at_rest, _directions(detected), sign)
+    problem = _Transfer(ways, f, at_rest, _directions(detected), sign)
     x, miss = np.concatenate([np.full(3, scale), np.zeros(12)]), 0.05
     for _ in range(4):
         fit = problem.solved(x, miss)
@@ -103,7 +103,7 @@ def _directions(detected: Detected) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _Transfer:
     """Unknowns: scale factors, errors of the gyro's and of the accelerometers' misalignments."""
 
     ways: Turns

@@ -21,7 +21,7 @@ _NO_CUTS: NDArray[np.int64] = np.array([], dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SectionMotion:
     """Samples ``start`` to ``stop`` of the accelerometers, the integral (3,) [output s] of the gyro over them and
     their ``duration`` [s], its ``rotation`` (3,) [output s] less a common bias, the direction ``up`` (3,) in it, the
     number of ``stretches`` between holds that it is made of, and whether it ``begins`` and ``ends`` with one."""
@@ -36,9 +36,9 @@ class Motion:
     ends: bool
     stretches: int = 1
 
-    def with_next(self, other: Motion) -> Motion:
+    def with_next(self, other: SectionMotion) -> SectionMotion:
         """This and the next one, with the pause between them."""
-        return Motion(
+        return SectionMotion(
             self.start,
             other.stop,
             self.integral + other.integral,
@@ -64,18 +64,18 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class AccelerometerLevel:
     """Level of uncalibrated accelerometers: output ``middle`` (3,) at no force, and ``size`` of gravity [output]."""
 
     middle: Array
     size: float
 
     @staticmethod
-    def of(acc: Triad, holds: tuple[Dwell, ...]) -> Level:
+    def of(acc: Triad, holds: tuple[Dwell, ...]) -> AccelerometerLevel:
         """By the holds: each axis lies level in most of them."""
         means = np.array([hold.of(acc.values).mean(axis=0) for hold in holds])
         middle = np.median(means, axis=0)
-        return Level(middle, float(np.max(np.linalg.norm(means - middle, axis=1))))
+        return AccelerometerLevel(middle, float(np.max(np.linalg.norm(means - middle, axis=1))))
 
     def up(self, values: Array) -> Array:
         """Direction (3,) of the mean specific force of samples (n, 3), as near as it shows; 0 where it does not."""
@@ -93,8 +93,13 @@ def part(gyro: Triad, acc: Triad, start: int, stop: int) -> tuple[Array, Array]:
 
 
 def motions(
-    acc: Triad, gyro: Triad, holds: tuple[Dwell, ...], level: Level, bias: Array, cuts: NDArray[np.int64]
-) -> Iterator[Motion]:
+    acc: Triad,
+    gyro: Triad,
+    holds: tuple[Dwell, ...],
+    level: AccelerometerLevel,
+    bias: Array,
+    cuts: NDArray[np.int64],
+) -> Iterator[SectionMotion]:
     """All runs of motions about an axis that leave the vertical where it was.
 
     ``bias`` (3,) is the mean output of the gyro at rest, ``cuts`` are the breaks of the time axis.
@@ -107,7 +112,7 @@ def motions(
     smooth = max(3, round(LIMITS.rate_window * gyro.rate))
     still = [part(gyro, acc, hold.start, hold.stop)[1] - bias for hold in holds]
     noise = 4.0 * float(np.median([np.sqrt(np.mean(_smoothed(rate, smooth) ** 2)) for rate in still]))
-    run: list[Motion] = []
+    run: list[SectionMotion] = []
     for stretch in static_intervals(~resting, cuts, 3):
         before, after = ends.get(stretch.start), begins.get(stretch.stop)
         if run and (before is None or run[-1].stop != before.start):
@@ -131,7 +136,7 @@ def motions(
 
 def _motion(
     acc: Triad, gyro: Triad, span: Dwell, bias: Array, ups: list[Array], stretch: Dwell
-) -> Motion | None:
+) -> SectionMotion | None:
     """A motion, or none where it is not known or takes the vertical elsewhere."""
     t, output = part(gyro, acc, span.start, span.stop)
     if (
@@ -143,7 +148,7 @@ def _motion(
     integral = np.asarray(np.trapezoid(output, t, axis=0), dtype=np.float64)
     length = float(t[-1] - t[0])
     up = ups[0] if ups else np.zeros(3)
-    return Motion(
+    return SectionMotion(
         span.start,
         span.stop,
         integral,

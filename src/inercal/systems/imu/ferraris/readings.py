@@ -24,7 +24,7 @@ _EDGE = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class SectionReadings:
     """Readings of the nine sections.
 
     ``inputs`` of the method and the ``weights`` (6,) of the positions in the gyro's bias; ``lengths`` (6,) of the
@@ -44,7 +44,7 @@ class Readings:
 
 def read_sections(
     acc: Triad, gyro: Triad, sections: Sections, site: Site, options: FerrarisSettings
-) -> Readings:
+) -> SectionReadings:
     """Average and integrate the sections, all nine of them."""
     at_rest = {
         triad.sensor: [triad.values[rows[name]] for name in POSITIONS]
@@ -77,7 +77,7 @@ def read_sections(
         gravity=np.array(site.gravity),
         vertical_rate=np.array(site.vertical_rate),
     )
-    return Readings(
+    return SectionReadings(
         inputs,
         weights,
         np.array([len(sections.acc[name]) for name in POSITIONS]) / acc.rate,

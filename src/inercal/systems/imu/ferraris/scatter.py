@@ -15,7 +15,7 @@ from inercal.foundation.geometry.earth import Site
 from inercal.foundation.inference.least_squares import LinearFit, least_squares
 from inercal.systems.imu.ferraris.method import Matrices
 from inercal.systems.imu.ferraris.names import UP
-from inercal.systems.imu.ferraris.readings import Readings
+from inercal.systems.imu.ferraris.readings import SectionReadings
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import FerrarisSettings
 
@@ -48,7 +48,7 @@ class Scatter:
     fits: dict[str, LinearFit]
 
 
-def judge(readings: Readings, solution: Matrices, site: Site, options: FerrarisSettings) -> Scatter:
+def judge(readings: SectionReadings, solution: Matrices, site: Site, options: FerrarisSettings) -> Scatter:
     """Compare the scatter of the positions with the noise at rest, the stated alignment and earth rate."""
     x = readings.inputs
     outputs = {"acc": x.force, "gyro": x.rate}

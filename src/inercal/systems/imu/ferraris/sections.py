@@ -22,7 +22,7 @@ from inercal.foundation.records.record import Record
 from inercal.foundation.units import shown
 from inercal.systems.imu.ferraris.detection import Detected, detect
 from inercal.systems.imu.ferraris.gravity_transfer import Carried, carry
-from inercal.systems.imu.ferraris.motions import Motion
+from inercal.systems.imu.ferraris.motions import SectionMotion
 from inercal.systems.imu.ferraris.names import NAMES, POSITIONS, TURNS
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import FerrarisSettings
@@ -35,7 +35,7 @@ class Choice:
     """The turns ``motions`` by axis; the ``doubt`` (3,) about their angles [rad], by what else they may have been; what
     speaks ``against`` the result, and other ``findings``."""
 
-    motions: dict[int, Motion]
+    motions: dict[int, SectionMotion]
     doubt: Array
     against: tuple[Finding, ...]
     findings: tuple[Finding, ...]
@@ -50,7 +50,7 @@ def choose(acc: Triad, gyro: Triad, detected: Detected, options: FerrarisSetting
     """
     carried = carry(acc, gyro, detected) if all(name in detected.positions for name in POSITIONS) else None
     about = {axis: [m for m in detected.motions if m.axis == axis] for axis in range(3)}
-    turns: dict[int, Motion] = {}
+    turns: dict[int, SectionMotion] = {}
     doubt, graded, untold = np.zeros(3), list[tuple[bool, Finding]](), []
     for axis, motions in about.items():
         gains = np.array([_gain(m, axis, carried, options.turn) for m in motions])
@@ -103,7 +103,7 @@ def choose(acc: Triad, gyro: Triad, detected: Detected, options: FerrarisSetting
     return Choice(turns, doubt, against, findings)
 
 
-def _gain(motion: Motion, axis: int, carried: Carried | None, turn: float) -> float:
+def _gain(motion: SectionMotion, axis: int, carried: Carried | None, turn: float) -> float:
     """The scale factor [output per rad/s] if this was the turn; bias and g-sensitivity are those in the positions."""
     if carried is None:
         return float(motion.rotation[axis] / turn)
@@ -111,14 +111,14 @@ def _gain(motion: Motion, axis: int, carried: Carried | None, turn: float) -> fl
     return float((motion.integral - motion.duration * bias)[axis] / turn)
 
 
-def _largest(about: Mapping[int, list[Motion]]) -> float:
+def _largest(about: Mapping[int, list[SectionMotion]]) -> float:
     """The largest rotation [output s] of a single stretch about one of the axes."""
     return max(
         (abs(m.rotation[k]) for k, each in about.items() for m in each if m.stretches == 1), default=0.0
     )
 
 
-def _where(acc: Triad, motion: Motion) -> str:
+def _where(acc: Triad, motion: SectionMotion) -> str:
     """Begin and end of a motion, in words."""
     return f"t {acc.t[motion.start]:.2f} to {acc.t[motion.stop - 1]:.2f} s"
 

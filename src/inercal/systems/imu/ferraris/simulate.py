@@ -17,7 +17,7 @@ from inercal.systems.imu.ferraris.names import POSITIONS, TURNS, UP
 from inercal.systems.imu.settings import Disturbances, FerrarisSettings, ImuSettings
 from inercal.systems.imu.simulate import (
     ImuTruth,
-    Noise,
+    TriadNoise,
     as_stated,
     draw_full_truth,
     indicated,
@@ -28,7 +28,7 @@ from inercal.systems.imu.simulate import (
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionCourse:
     """The course of a session.
 
     ``holds`` lengths of the six positions, ``turning`` that of a turn, ``rest`` of the pauses before and after it and
@@ -63,7 +63,7 @@ def true_values(truth: ImuTruth) -> Array:
 
 def simulate_session(
     truth: ImuTruth,
-    session: Session,
+    session: SessionCourse,
     rng: np.random.Generator,
     disturbances: Disturbances = Disturbances(),  # noqa: B008  (frozen)
 ) -> tuple[Record, ImuTruth]:
@@ -129,7 +129,7 @@ def simulate_session(
 
 def _outputs(
     truth: ImuTruth,
-    session: Session,
+    session: SessionCourse,
     q_nb: Array,
     omega: Array,
     labels: list[str],
@@ -190,14 +190,14 @@ def _motion(start: Array, step: Array, length: float, rate: float) -> tuple[Arra
 
 def quiet(truth: ImuTruth) -> ImuTruth:
     """The same instrument without noise."""
-    return replace(truth, accelerometer_noise=Noise(0.0), gyro_noise=Noise(0.0))
+    return replace(truth, accelerometer_noise=TriadNoise(0.0), gyro_noise=TriadNoise(0.0))
 
 
 def simulate_study(settings: ImuSettings, options: FerrarisSettings, rng: np.random.Generator) -> Record:
     """The session of a study; directions and turns are off by the uncertainties that it states."""
     of, site = settings.simulation, settings.site
     truth = as_stated(draw_full_truth(rng), of)
-    session = Session(
+    session = SessionCourse(
         holds=(of.hold,) * 6,
         turn=options.turn,
         turning=of.turning,

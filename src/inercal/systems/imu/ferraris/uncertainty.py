@@ -17,7 +17,7 @@ from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.imu.ferraris.method import Matrices, derivatives
 from inercal.systems.imu.ferraris.names import UP
-from inercal.systems.imu.ferraris.readings import Readings
+from inercal.systems.imu.ferraris.readings import SectionReadings
 from inercal.systems.imu.ferraris.scatter import Scatter
 from inercal.systems.imu.second_order import SOURCE
 from inercal.systems.imu.settings import FerrarisSettings
@@ -29,13 +29,13 @@ _AXIS = np.repeat(np.arange(3), 2)
 class Propagation:
     """Readings and matrices with the derivatives ``by`` (33, *shape) of the coefficients, by input."""
 
-    readings: Readings
+    readings: SectionReadings
     solution: Matrices
     scatter: Scatter
     by: dict[str, Array]
 
 
-def propagation(readings: Readings, solution: Matrices, scatter: Scatter) -> Propagation:
+def propagation(readings: SectionReadings, solution: Matrices, scatter: Scatter) -> Propagation:
     """Take the derivatives."""
     return Propagation(readings, solution, scatter, derivatives(readings.inputs, readings.weights))
 

@@ -14,7 +14,7 @@ from inercal.foundation.records.column import Triad
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.ferraris.method import Inputs, Matrices
 from inercal.systems.imu.ferraris.names import NAMES, POSITIONS, TURNS, in_words
-from inercal.systems.imu.ferraris.readings import Readings
+from inercal.systems.imu.ferraris.readings import SectionReadings
 from inercal.systems.imu.ferraris.scatter import Scatter
 from inercal.systems.imu.ferraris.sections import Sections
 from inercal.systems.imu.limits import LIMITS
@@ -157,7 +157,7 @@ def scatter_findings(scatter: Scatter, options: FerrarisSettings) -> Iterator[Fi
 
 
 def verdict(
-    readings: Readings, scatter: Scatter, against: list[Finding], options: FerrarisSettings
+    readings: SectionReadings, scatter: Scatter, against: list[Finding], options: FerrarisSettings
 ) -> tuple[Status, str]:
     """Status and message; ``against`` what contradicts the result."""
     poor = [*(finding for finding in readings.findings if finding.code != "turn_cut"), *against]

@@ -25,7 +25,7 @@ from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeA, TypeB, combine
 from inercal.foundation.results.result import Estimate, timed
-from inercal.systems.imu.known_turns.turn import Turn, find_turn, noise_at_rest, stamped
+from inercal.systems.imu.known_turns.turn import RestToRestTurn, find_turn, noise_at_rest, stamped
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import clipped_rows, unit_words
 from inercal.systems.imu.settings import COMMAND, ImuSettings, KnownTurnsSettings
@@ -51,7 +51,7 @@ class KnownTurnsCalibration:
     """An ``estimate``, and the ``turns`` behind it by axis, as far as they were found."""
 
     estimate: Estimate
-    turns: Mapping[str, Turn]
+    turns: Mapping[str, RestToRestTurn]
 
 
 def calibrate_known_turns(
@@ -232,7 +232,7 @@ def _exact(options: KnownTurnsSettings, angles: Array) -> list[Finding]:
     return findings
 
 
-def _wander(turns: Sequence[Turn], noise: AllanFit) -> tuple[list[Finding], Array, float]:
+def _wander(turns: Sequence[RestToRestTurn], noise: AllanFit) -> tuple[list[Finding], Array, float]:
     """A finding about biases that drift from rest to rest; the variance (3,) of a rest beyond its noise; its dof."""
     differences = np.array([turn.after - turn.before for turn in turns])
     expected = np.array([noise.variance(turn.rests).sum(axis=0) for turn in turns])
@@ -251,7 +251,7 @@ def _wander(turns: Sequence[Turn], noise: AllanFit) -> tuple[list[Finding], Arra
 
 
 def _sources(
-    turns: Sequence[Turn],
+    turns: Sequence[RestToRestTurn],
     noise: AllanFit,
     angles: Array,
     options: KnownTurnsSettings,
@@ -349,7 +349,9 @@ def _alignment(gain: Array, by_gain: Array, tilt: float) -> Array:
     return np.column_stack([*first, tilt * np.sum(second, axis=0), *(tilt * each for each in second)])
 
 
-def _result(turns: Mapping[str, Turn], angles: Array, gain: Array, triad: Triad) -> dict[str, object]:
+def _result(
+    turns: Mapping[str, RestToRestTurn], angles: Array, gain: Array, triad: Triad
+) -> dict[str, object]:
     """The command's own part of the result: a row for each turn."""
     return {
         "method": "known_turns",

@@ -14,7 +14,7 @@ from inercal.systems.imu.limits import LIMITS
 
 
 @dataclass(frozen=True)
-class Turn:
+class RestToRestTurn:
     """A turn from rest to rest.
 
     ``begin`` and ``end`` [s] its ends on the clock ``t`` (n,); ``before`` and ``after`` (3,) the mean outputs at rest
@@ -45,7 +45,7 @@ class Turn:
         return np.asarray(self.weights[0] * self.before + self.weights[1] * self.after)
 
 
-def find_turn(t: Array, values: Array) -> Turn | str:
+def find_turn(t: Array, values: Array) -> RestToRestTurn | str:
     """The turn in a section with one; what is wrong, in words, where there is none from rest to rest.
 
     Parameters
@@ -84,14 +84,14 @@ def find_turn(t: Array, values: Array) -> Turn | str:
     second = float((middle - middles[0]) / (middles[1] - middles[0]))
     part = slice(first, last + 1)
     integral = np.sum(0.5 * (values[part][1:] + values[part][:-1]) * gaps[:, None], axis=0)
-    return Turn(
+    return RestToRestTurn(
         t, speed, float(t[first]), float(t[last]), before.mean(axis=0), after.mean(axis=0),
         np.array([len(before), len(after)]) * step, integral, np.array([1.0 - second, second]),
         (before, after),
     )  # fmt: skip
 
 
-def noise_at_rest(turns: Sequence[Turn]) -> AllanFit:
+def noise_at_rest(turns: Sequence[RestToRestTurn]) -> AllanFit:
     """The noise of the gyro in all rests together; that of one rest is hardly known."""
     stretches = [stretch for turn in turns for stretch in turn.stretches]
     interval = float(np.mean([turn.rests.sum() / sum(map(len, turn.stretches)) for turn in turns]))

@@ -26,7 +26,7 @@ from inercal.systems.imu.identified import weakness
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
 from inercal.systems.imu.multiposition.deletion import outlying
-from inercal.systems.imu.multiposition.joint import Joint, Scatter, join, type_a, type_b
+from inercal.systems.imu.multiposition.joint import JointTriads, PoseScatter, join, type_a, type_b
 from inercal.systems.imu.multiposition.outcome import FRAME, REFERENCES
 from inercal.systems.imu.multiposition.outliers import linear_poses
 from inercal.systems.imu.multiposition.squares import squares_finding, squares_shown, squares_source
@@ -57,12 +57,12 @@ class MeansCalibration:
 
 
 @dataclass(frozen=True)
-class _Fitted:
+class _FittedRows:
     """Rows fitted: the accelerometers with their scatter and covariance."""
 
     fit: AccelerometerFit
-    scatter: Scatter
-    joint: Joint
+    scatter: PoseScatter
+    joint: JointTriads
     uncertainty: Uncertainty
 
 
@@ -161,22 +161,22 @@ def _used(
     return outputs[kept], numbers[kept], findings
 
 
-def _fit(outputs: Array, settings: ImuSettings) -> _Fitted:
+def _fit(outputs: Array, settings: ImuSettings) -> _FittedRows:
     """Fit the rows, with their covariance."""
     fit = fit_accelerometer(outputs, settings.site.gravity, squares=settings.k2)
     dof = max(fit.fit.dof, 1)
-    scatter = Scatter(float(np.sqrt(fit.fit.chi2 / dof)), dof, False, np.nan)
+    scatter = PoseScatter(float(np.sqrt(fit.fit.chi2 / dof)), dof, False, np.nan)
     joint = join(fit, None)
     sources: list[TypeA | TypeB] = [
         *type_a(joint, scatter, ""),
         *type_b(joint, settings.site, 0.0, np.zeros(3), ""),
         *squares_source(joint, scatter, k2_size(settings, scatter.s)),
     ]
-    return _Fitted(fit, scatter, joint, combine(joint.names, sources))
+    return _FittedRows(fit, scatter, joint, combine(joint.names, sources))
 
 
 def _findings(
-    fitted: _Fitted, outputs: Array, numbers: NDArray[np.int64], settings: ImuSettings
+    fitted: _FittedRows, outputs: Array, numbers: NDArray[np.int64], settings: ImuSettings
 ) -> list[Finding]:
     """Findings about poses that lie off all others or are hardly enough, and about K2."""
     findings = []

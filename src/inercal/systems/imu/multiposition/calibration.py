@@ -27,7 +27,7 @@ from inercal.systems.imu.multiposition.drift import (
 from inercal.systems.imu.multiposition.drivers import drivers_of
 from inercal.systems.imu.multiposition.earth_rate import earth_rate_at
 from inercal.systems.imu.multiposition.gyro import GyroFit, fit_gyro
-from inercal.systems.imu.multiposition.joint import Joint, Scatter, force_error, join
+from inercal.systems.imu.multiposition.joint import JointTriads, PoseScatter, force_error, join
 from inercal.systems.imu.multiposition.left_out import unexplained
 from inercal.systems.imu.multiposition.outcome import assemble, uncertainty_of, without_fit
 from inercal.systems.imu.multiposition.outliers import Outliers, outlier_finding, outliers_of
@@ -63,9 +63,9 @@ class _Fitted:
     """Accelerometers and gyro fitted to some of the poses and turns, with findings about that."""
 
     poses: Poses
-    scatter: Scatter
+    scatter: PoseScatter
     gyro: GyroFit | None
-    joint: Joint
+    joint: JointTriads
     findings: list[Finding]
 
 
@@ -166,7 +166,7 @@ def _left_out(
     yield from squares_finding(joint, poses.means, uncertainty, settings, size, stand.get("squares"))
 
 
-def _scatter(poses: Poses) -> Scatter:
+def _scatter(poses: Poses) -> PoseScatter:
     """Residual scatter, pooled with the noise at rest unless it clearly differs from that (F test, both sides)."""
     from scipy.special import fdtr, fdtrc
 
@@ -175,8 +175,8 @@ def _scatter(poses: Poses) -> Scatter:
     ratio = own / noise if noise > 0 else np.inf
     more = noise <= 0 or fdtrc(fit.dof, poses.noise_dof, ratio) < LIMITS.scatter_probability
     if more or fdtr(fit.dof, poses.noise_dof, ratio) < LIMITS.low_scatter_probability:
-        return Scatter(float(np.sqrt(own)), fit.dof, bool(more), float(np.sqrt(ratio)))
-    return Scatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
+        return PoseScatter(float(np.sqrt(own)), fit.dof, bool(more), float(np.sqrt(ratio)))
+    return PoseScatter(float(np.sqrt(poses.misfit)), fit.dof + poses.noise_dof, False, float(np.sqrt(ratio)))
 
 
 def _gyro_index(recording: Recording, sample: int) -> int:
@@ -244,7 +244,7 @@ def _turns(
 def _calibrate_gyro(
     recording: Recording,
     poses: Poses,
-    scatter: Scatter,
+    scatter: PoseScatter,
     settings: ImuSettings,
     without: Collection[tuple[int, int]],
 ) -> tuple[GyroFit | None, list[Finding]]:

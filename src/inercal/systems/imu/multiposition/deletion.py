@@ -33,7 +33,7 @@ class Added(NamedTuple):
 
 
 @dataclass(frozen=True)
-class LinearFit:
+class LinearisedFit:
     """A fit made linear: n items of d rows each.
 
     ``residuals`` (n, d) where no other data pull the parameters, and their ``jacobian`` (n, d, P); ``known`` (n d, n d)
@@ -51,7 +51,7 @@ class LinearFit:
     @classmethod
     def beside(
         cls, residuals: Array, jacobian: Array, known: Array, growth: Array, other: Array, left: Array
-    ) -> LinearFit:
+    ) -> LinearisedFit:
         """A fit to ``residuals`` (n, d) at the minimum, beside others ``left`` (k,) of jacobian ``other``."""
         information = other.T @ other
         size = np.where(np.diag(information) > 0.0, np.sqrt(np.diag(information)), 1.0)
@@ -62,7 +62,7 @@ class LinearFit:
         """Number of items."""
         return len(self.residuals)
 
-    def only(self, kept: NDArray[np.bool_]) -> LinearFit:
+    def only(self, kept: NDArray[np.bool_]) -> LinearisedFit:
         """The fit to a part of the items, a mask (n,)."""
         rows = np.repeat(kept, self.residuals.shape[1])
         return replace(
@@ -160,7 +160,7 @@ class LinearFit:
         return math.exp(float(brentq(surplus, math.log(least), math.log(most), xtol=1e-4)))
 
 
-def outlying(fit: LinearFit, risk: float) -> list[int]:
+def outlying(fit: LinearisedFit, risk: float) -> list[int]:
     """Items that do not belong to the others, at that ``risk`` that any is named falsely."""
     from scipy.special import fdtrc
 
@@ -197,7 +197,7 @@ class HeldOut:
     high: float
 
 
-def held_out(fit: LinearFit, variance: float) -> HeldOut | None:
+def held_out(fit: LinearisedFit, variance: float) -> HeldOut | None:
     """Every second item foretold by the rest, for that ``variance`` of the growing part; None if these are too few."""
     from scipy.special import chdtri
 

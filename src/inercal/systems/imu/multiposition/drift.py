@@ -16,8 +16,8 @@ from inercal.foundation.results.budget import Uncertainty
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import inverses
 from inercal.systems.imu.multiposition.gyro import GyroFit
-from inercal.systems.imu.multiposition.joint import Joint
-from inercal.systems.imu.multiposition.left_out import Tested, effects, harmed, in_words, shown
+from inercal.systems.imu.multiposition.joint import JointTriads
+from inercal.systems.imu.multiposition.left_out import TestedErrors, effects, harmed, in_words, shown
 
 _PPM = 1e-6
 _SCALES = slice(3, 6)
@@ -29,7 +29,7 @@ _SETTLING = (3.0, 10.0)
 _CURE = "let the unit warm up before the first pose, or take less time"
 
 
-def bias_drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
+def bias_drift_shown(joint: JointTriads, times: Array, noise: float, noise_dof: float) -> TestedErrors | None:
     """Biases that change over the range of ``times`` (n,) [s] of the poses, where the poses show them.
 
     Evenly, or as a unit settles, with time constants of a third and a tenth of that range: the likeliest of the three.
@@ -38,15 +38,17 @@ def bias_drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float)
     return _drift_shown(joint, times, np.ones((len(times), 3)), noise, noise_dof)
 
 
-def scale_drift_shown(joint: Joint, times: Array, noise: float, noise_dof: float) -> Tested | None:
+def scale_drift_shown(
+    joint: JointTriads, times: Array, noise: float, noise_dof: float
+) -> TestedErrors | None:
     """The same of scale factors, relative."""
     acc = joint.accelerometer
     return _drift_shown(joint, times, acc.model.scale * (acc.f @ acc.model.misalignment.T), noise, noise_dof)
 
 
 def _drift_shown(
-    joint: Joint, times: Array, in_output: Array, noise: float, noise_dof: float
-) -> Tested | None:
+    joint: JointTriads, times: Array, in_output: Array, noise: float, noise_dof: float
+) -> TestedErrors | None:
     """Errors that grow with time to changes ``in_output`` (n, 3) of each axis, where the poses show them."""
     acc = joint.accelerometer
     lasts = float(np.ptp(times))
@@ -59,7 +61,7 @@ def _drift_shown(
         of = effects(joint, in_force.reshape(-1, 3))
         found = shown(joint, of, noise, noise_dof, tries=len(courses))
         if found is not None and (best is None or found.probability < best.shown.probability):
-            best = Tested(of, found, LIMITS.driver_probability, len(courses))
+            best = TestedErrors(of, found, LIMITS.driver_probability, len(courses))
     return None if best is None or best.shown.probability > best.limit else best
 
 
@@ -68,7 +70,9 @@ def _courses(part: Array) -> list[Array]:
     return [part, *(-np.exp(-rate * part) / -np.expm1(-rate) for rate in _SETTLING)]
 
 
-def bias_drift_finding(joint: Joint, found: Tested, unit: str, uncertainty: Uncertainty) -> Finding:
+def bias_drift_finding(
+    joint: JointTriads, found: TestedErrors, unit: str, uncertainty: Uncertainty
+) -> Finding:
     """The finding about biases that drift; outputs are in ``unit``.
 
     It does harm where a value is shifted by more than its u, in which the scatter that the drift makes is already.
@@ -108,7 +112,7 @@ def gyro_scale_drift(
     )
 
 
-def scale_drift_finding(joint: Joint, found: Tested, uncertainty: Uncertainty) -> Finding:
+def scale_drift_finding(joint: JointTriads, found: TestedErrors, uncertainty: Uncertainty) -> Finding:
     """The finding about scale factors that drift; harm as with biases."""
     return Finding(
         "trend",

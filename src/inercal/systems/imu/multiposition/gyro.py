@@ -21,7 +21,7 @@ from inercal.foundation.inference.identifiability import Identifiability, identi
 from inercal.foundation.inference.least_squares import NonlinearFit, least_squares, solve
 from inercal.foundation.instruments.terms import GYRO_TRIAD
 from inercal.foundation.instruments.triad import TriadModel
-from inercal.systems.imu.multiposition.deletion import LinearFit
+from inercal.systems.imu.multiposition.deletion import LinearisedFit
 from inercal.systems.imu.multiposition.drivers import Drivers
 from inercal.systems.imu.multiposition.earth_rate import (
     EarthRate,
@@ -100,7 +100,7 @@ class GyroFit:
     vertical_error: Array
     durations: Array
     first: NDArray[np.int64]
-    linear: LinearFit
+    linear: LinearisedFit
 
 
 def fit_gyro(
@@ -253,14 +253,14 @@ class _Problem:
 
 def _across(
     turns: Turns, verticals: Array, miss: Array, by_verticals: Array, fit: NonlinearFit, weigh: Array
-) -> LinearFit:
+) -> LinearisedFit:
     """The misses (m, 2) in the two directions across the vertical at the end of each turn, beside all other data."""
     m, rows = len(turns), len(miss)
     across = np.linalg.svd(verticals[turns.last][:, None, :])[2][:, 1:]
     whole = np.zeros((m, 2, m, 3))
     whole[range(m), :, range(m)] = across
     project = whole.reshape(2 * m, rows)
-    return LinearFit.beside(
+    return LinearisedFit.beside(
         (project @ miss).reshape(m, 2),
         (project @ np.linalg.solve(weigh, fit.jacobian[:rows])).reshape(m, 2, -1),
         project @ by_verticals @ project.T,

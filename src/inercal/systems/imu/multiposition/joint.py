@@ -21,7 +21,7 @@ from inercal.systems.imu.multiposition.gyro import GyroFit
 
 
 @dataclass(frozen=True)
-class Scatter:
+class PoseScatter:
     """Standard deviation of |f| in a pose about the fit [m/s^2], its degrees of freedom, and whether it
     exceeds what the sensors' noise explains."""
 
@@ -46,7 +46,7 @@ def force_error(fit: AccelerometerFit) -> Array:
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointTriads:
     """Names, values and gains of accelerometers and gyro together (p parameters).
 
     ``by_force`` (p, 3 n), ``by_turn`` (p, 3 m) and ``by_output`` (p, 3 n) take the three kinds of errors to
@@ -62,17 +62,17 @@ class Joint:
     gyro: GyroFit | None
 
 
-def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
+def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> JointTriads:
     """Stack the two fits."""
     by_force = accelerometer.fit.gain() @ radial(accelerometer)
     names, values = accelerometer.names, accelerometer.fit.x
     if gyro is None:
         empty = np.zeros((len(names), 0))
-        return Joint(names, values, by_force, empty, empty, accelerometer, None)
+        return JointTriads(names, values, by_force, empty, empty, accelerometer, None)
     turns, poses = gyro.vertical_error.shape[0], by_force.shape[1]
     to_turn, to_output = gyro.gain[:, :turns], gyro.gain[:, turns:]
     pad = len(names)
-    return Joint(
+    return JointTriads(
         names + gyro.names,
         np.concatenate([values, gyro.x]),
         np.vstack([by_force, to_turn @ gyro.vertical_error]),
@@ -83,7 +83,7 @@ def join(accelerometer: AccelerometerFit, gyro: GyroFit | None) -> Joint:
     )
 
 
-def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
+def type_a(joint: JointTriads, scatter: PoseScatter, gyro_unit: str) -> list[TypeA]:
     """Uncertainties of the parameters by scatter in the data; ``gyro_unit`` is that of the gyro's output."""
     sources = [
         TypeA(
@@ -104,7 +104,9 @@ def type_a(joint: Joint, scatter: Scatter, gyro_unit: str) -> list[TypeA]:
     return sources
 
 
-def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro_unit: str) -> list[TypeB]:
+def type_b(
+    joint: JointTriads, site: Site, time_base_u: float, resolution: Array, gyro_unit: str
+) -> list[TypeB]:
     """Uncertainties of the parameters by gravity, the record's clock, earth rate and the gyro's resolution.
 
     ``resolution`` (3,) [``gyro_unit``] is the step of gyro outputs too coarse for their noise, else 0: then every
@@ -138,7 +140,7 @@ def type_b(joint: Joint, site: Site, time_base_u: float, resolution: Array, gyro
     return sources
 
 
-def noise_covariance(joint: Joint, pose: Array, walk: Array, output: Array) -> Array:
+def noise_covariance(joint: JointTriads, pose: Array, walk: Array, output: Array) -> Array:
     """(p, p): covariance by the sensors' noise alone.
 
     Parameters

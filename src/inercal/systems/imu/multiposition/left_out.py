@@ -10,10 +10,10 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.results.shown import rounded
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.deletion import Added
-from inercal.systems.imu.multiposition.joint import Joint, radial
+from inercal.systems.imu.multiposition.joint import JointTriads, radial
 
 
-class Effects(NamedTuple):
+class PoseEffects(NamedTuple):
     """Changes by q errors: of |f| - g in n poses beyond what the fitted coefficients take up, ``unexplained`` (n, q)
     [m/s^2], and of the p coefficients, ``shifts`` (p, q)."""
 
@@ -21,7 +21,7 @@ class Effects(NamedTuple):
     shifts: Array
 
 
-class Shown(NamedTuple):
+class ShownErrors(NamedTuple):
     """The answer of the poses about q errors: likeliest sizes ``estimate`` (q,) with ``u`` (q,), and ``probability`` of
     so much by chance."""
 
@@ -30,46 +30,46 @@ class Shown(NamedTuple):
     probability: float
 
 
-class Tested(NamedTuple):
+class TestedErrors(NamedTuple):
     """Errors with their ``effects``, ``shown`` by the poses with a probability below ``limit``, as the likeliest of so
     many ``tries``."""
 
-    effects: Effects
-    shown: Shown
+    effects: PoseEffects
+    shown: ShownErrors
     limit: float
     tries: int = 1
 
 
-def in_words(found: Shown | Added, size: float = 1.0) -> str:
+def in_words(found: ShownErrors | Added, size: float = 1.0) -> str:
     """The sizes of errors of the three axes with their u, in units of ``size``: ``x 20 ± 3, y ..``."""
     each = zip("xyz", found.estimate / size, found.u / size, strict=True)
     return ", ".join(f"{axis} {' ± '.join(rounded(value, u))}" for axis, value, u in each)
 
 
-def harmed(found: Tested, names: tuple[str, ...], u: Array) -> tuple[str, ...]:
+def harmed(found: TestedErrors, names: tuple[str, ...], u: Array) -> tuple[str, ...]:
     """Those of the coefficients ``names`` (p,) that errors shift by more than ``u`` (p,)."""
     beyond = np.abs(found.effects.shifts @ found.shown.estimate) > u
     return tuple(name for name, more in zip(names, beyond, strict=True) if more)
 
 
-def effects(joint: Joint, in_force: Array) -> Effects:
+def effects(joint: JointTriads, in_force: Array) -> PoseEffects:
     """Effects of errors that change the specific force in the poses by ``in_force`` (3 n, q)."""
     acc = joint.accelerometer
     columns = radial(acc) @ in_force
     J = acc.fit.jacobian
-    return Effects(
+    return PoseEffects(
         columns - J @ (acc.fit.unit_covariance @ (J.T @ columns)), np.asarray(joint.by_force @ in_force)
     )
 
 
 def shown(
-    joint: Joint,
-    of: Effects,
+    joint: JointTriads,
+    of: PoseEffects,
     noise: float = 0.0,
     noise_dof: float = 0.0,
-    beside: Effects | None = None,
+    beside: PoseEffects | None = None,
     tries: int = 1,
-) -> Shown | None:
+) -> ShownErrors | None:
     """The answer of the residuals about errors, by an F test; None where too few poses are left, or no scatter, or
     where the poses cannot tell the errors apart.
 
@@ -100,18 +100,20 @@ def shown(
         left, dof = (dof * left + noise_dof * noise) / (dof + noise_dof), dof + noise_dof
     pooled = tries * float(fdtrc(q, dof, gained / q / left))
     u = np.asarray(np.sqrt(np.diag(np.linalg.inv(K)) * left))
-    return Shown(estimate, u, min(1.0, pooled if alone < LIMITS.alone_probability else max(alone, pooled)))
+    return ShownErrors(
+        estimate, u, min(1.0, pooled if alone < LIMITS.alone_probability else max(alone, pooled))
+    )
 
 
 def unexplained(
-    joint: Joint, found: dict[str, Tested | None], noise: float, noise_dof: float
-) -> dict[str, Tested]:
+    joint: JointTriads, found: dict[str, TestedErrors | None], noise: float, noise_dof: float
+) -> dict[str, TestedErrors]:
     """Of the errors ``found``, by name, those for which none of the others leaves nothing while itself it stays."""
     stand = {name: each for name, each in found.items() if each is not None}
     if len(stand) < 2:
         return stand
 
-    def gone(one: Tested, other: Tested) -> bool:
+    def gone(one: TestedErrors, other: TestedErrors) -> bool:
         left = shown(joint, one.effects, noise, noise_dof, other.effects, one.tries)
         return left is None or left.probability > one.limit
 

@@ -20,7 +20,7 @@ from inercal.systems.imu.identified import spread_words
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.deletion import held_out
 from inercal.systems.imu.multiposition.gyro import GyroFit
-from inercal.systems.imu.multiposition.joint import Joint, Scatter, noise_covariance, type_a, type_b
+from inercal.systems.imu.multiposition.joint import JointTriads, PoseScatter, noise_covariance, type_a, type_b
 from inercal.systems.imu.multiposition.outliers import linear_poses
 from inercal.systems.imu.multiposition.poses import MULTIPLES, Poses, distinct, dwells_at
 from inercal.systems.imu.multiposition.squares import squares_source
@@ -53,8 +53,8 @@ def assemble(
     record: Record,
     recording: Recording,
     poses: Poses,
-    scatter: Scatter,
-    joint: Joint,
+    scatter: PoseScatter,
+    joint: JointTriads,
     settings: ImuSettings,
     findings: list[Finding],
 ) -> Estimate:
@@ -104,7 +104,7 @@ def assemble(
 
 
 def uncertainty_of(
-    joint: Joint, scatter: Scatter, recording: Recording, settings: ImuSettings
+    joint: JointTriads, scatter: PoseScatter, recording: Recording, settings: ImuSettings
 ) -> Uncertainty:
     """Covariance, degrees of freedom and budget of the coefficients."""
     unit = _gyro_unit(recording)
@@ -141,7 +141,7 @@ def _named(names: tuple[str, ...], values: Array) -> dict[str, float]:
     return dict(zip(names, np.asarray(values).tolist(), strict=True))
 
 
-def _noise(recording: Recording, poses: Poses, joint: Joint) -> tuple[Array, Array, Array]:
+def _noise(recording: Recording, poses: Poses, joint: JointTriads) -> tuple[Array, Array, Array]:
     """Variances that the sensors' noise explains: see `noise_covariance`."""
     pose = np.repeat(poses.noise_variance, 3)
     if joint.gyro is None:
@@ -184,7 +184,7 @@ def _interval_table(recording: Recording, poses: Poses) -> list[Mapping[str, Any
     ]
 
 
-def _turn_table(joint: Joint, poses: Poses, recording: Recording) -> list[Mapping[str, Any]]:
+def _turn_table(joint: JointTriads, poses: Poses, recording: Recording) -> list[Mapping[str, Any]]:
     """One row for each turn used."""
     if joint.gyro is None:
         return []
@@ -201,7 +201,7 @@ def _turn_table(joint: Joint, poses: Poses, recording: Recording) -> list[Mappin
     ]
 
 
-def _held_out(poses: Poses, scatter: Scatter, gyro: GyroFit | None) -> Mapping[str, Any]:
+def _held_out(poses: Poses, scatter: PoseScatter, gyro: GyroFit | None) -> Mapping[str, Any]:
     """Every second pose and turn foretold by the others: rms error over u, its count, and the 99 % range of that."""
     of_poses = held_out(linear_poses(poses.accelerometer), scatter.s**2)
     of_turns = None if gyro is None else held_out(gyro.linear, gyro.walk**2)

@@ -11,9 +11,9 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit
-from inercal.systems.imu.multiposition.deletion import LinearFit, outlying
+from inercal.systems.imu.multiposition.deletion import LinearisedFit, outlying
 from inercal.systems.imu.multiposition.gyro import GyroFit
-from inercal.systems.imu.multiposition.joint import Joint
+from inercal.systems.imu.multiposition.joint import JointTriads
 from inercal.systems.imu.multiposition.poses import Poses
 
 
@@ -29,11 +29,11 @@ class Outliers:
         return bool(self.poses or self.turns)
 
 
-def linear_poses(fit: AccelerometerFit) -> LinearFit:
+def linear_poses(fit: AccelerometerFit) -> LinearisedFit:
     """The residuals of the poses, made linear."""
     n, p = fit.fit.jacobian.shape
     jacobian = fit.fit.jacobian[:, None, :]
-    return LinearFit(fit.fit.residuals[:, None], jacobian, np.zeros((n, n)), np.ones(n), np.zeros((p, p)))
+    return LinearisedFit(fit.fit.residuals[:, None], jacobian, np.zeros((n, n)), np.ones(n), np.zeros((p, p)))
 
 
 def outliers_of(poses: Poses, gyro: GyroFit | None) -> Outliers:
@@ -48,7 +48,13 @@ def outliers_of(poses: Poses, gyro: GyroFit | None) -> Outliers:
 
 
 def outlier_finding(
-    outliers: Outliers, poses: Poses, t: Array, gyro: GyroFit | None, here: Joint, without: Joint, u: Array
+    outliers: Outliers,
+    poses: Poses,
+    t: Array,
+    gyro: GyroFit | None,
+    here: JointTriads,
+    without: JointTriads,
+    u: Array,
 ) -> Finding:
     """The finding about outliers.
 

@@ -16,8 +16,15 @@ from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.budget import TypeB, Uncertainty
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit, fit_accelerometer
-from inercal.systems.imu.multiposition.joint import Joint, Scatter
-from inercal.systems.imu.multiposition.left_out import Effects, Tested, effects, harmed, in_words, shown
+from inercal.systems.imu.multiposition.joint import JointTriads, PoseScatter
+from inercal.systems.imu.multiposition.left_out import (
+    PoseEffects,
+    TestedErrors,
+    effects,
+    harmed,
+    in_words,
+    shown,
+)
 from inercal.systems.imu.second_order import SOURCE, k2_finding, shares
 from inercal.systems.imu.settings import ImuSettings
 
@@ -25,7 +32,7 @@ _LEAST_SCATTER = 1e-9
 """Scatter [m/s^2] that rounding leaves."""
 
 
-def squares_source(joint: Joint, scatter: Scatter, size: float) -> list[TypeB]:
+def squares_source(joint: JointTriads, scatter: PoseScatter, size: float) -> list[TypeB]:
     """The part of u by K2 that is not fitted; empty where it is.
 
     K2 of each axis is 0 with the standard deviation ``size`` [1/(m/s^2)] before the data. The values are not corrected
@@ -42,8 +49,8 @@ def squares_source(joint: Joint, scatter: Scatter, size: float) -> list[TypeB]:
 
 
 def squares_shown(
-    joint: Joint, means: Array, gravity: float, noise: float = 0.0, noise_dof: float = 0.0
-) -> Tested | None:
+    joint: JointTriads, means: Array, gravity: float, noise: float = 0.0, noise_dof: float = 0.0
+) -> TestedErrors | None:
     """K2 that is not fitted, where the poses, of mean outputs ``means`` (n, 3), allow to fit it and show it.
 
     ``noise`` and ``noise_dof`` are those of `inercal.systems.imu.multiposition.left_out.shown`.
@@ -55,16 +62,16 @@ def squares_shown(
     found = shown(joint, of, noise, noise_dof)
     if found is None or found.probability > LIMITS.k2_probability:
         return None
-    return Tested(of, found, LIMITS.k2_probability)
+    return TestedErrors(of, found, LIMITS.k2_probability)
 
 
 def squares_finding(
-    joint: Joint,
+    joint: JointTriads,
     means: Array,
     uncertainty: Uncertainty,
     settings: ImuSettings,
     size: float,
-    found: Tested | None,
+    found: TestedErrors | None,
 ) -> Iterator[Finding]:
     """A finding where K2 was ``found`` by `squares_shown`, or where u of a value is mostly an ordinary one; none where
     it is fitted.
@@ -94,7 +101,7 @@ def squares_finding(
     yield from k2_finding(names, uncertainty, settings, size, cure)
 
 
-def _effects(joint: Joint) -> Effects:
+def _effects(joint: JointTriads) -> PoseEffects:
     """Effects of K2 of each axis."""
     return effects(joint, joint.accelerometer.force_by_squares().reshape(-1, 3))
 

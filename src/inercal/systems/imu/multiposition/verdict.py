@@ -19,7 +19,7 @@ from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.multiposition.accelerometer import AccelerometerFit
 from inercal.systems.imu.multiposition.drivers import Drivers
 from inercal.systems.imu.multiposition.gyro import GyroFit, regress_static
-from inercal.systems.imu.multiposition.joint import Scatter
+from inercal.systems.imu.multiposition.joint import PoseScatter
 from inercal.systems.imu.multiposition.poses import Poses
 from inercal.systems.imu.recording import Recording, unit_words
 from inercal.systems.imu.turns import Turns, first_guess
@@ -113,7 +113,7 @@ def by_turns(recording: Recording, rests: int) -> str:
     )
 
 
-def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
+def scatter_findings(poses: Poses, scatter: PoseScatter) -> Iterator[Finding]:
     """Findings about the fit of the poses."""
     dof = poses.accelerometer.fit.dof
     if dof < 5:
@@ -133,7 +133,7 @@ def scatter_findings(poses: Poses, scatter: Scatter) -> Iterator[Finding]:
         )
 
 
-def clipped_poses(poses: Poses, scatter: Scatter, recording: Recording) -> Iterator[Finding]:
+def clipped_poses(poses: Poses, scatter: PoseScatter, recording: Recording) -> Iterator[Finding]:
     """Accelerometers that sit at the end of their range in a pose, so that its mean is short."""
     if not scatter.excess:
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Panel
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK, QUIET, plain_unit
 from inercal.foundation.arrays import Array
@@ -30,7 +30,7 @@ def _group(curves: list[Curve]) -> Picture:
         grid = np.linspace(curve.temperature.min(), curve.temperature.max(), 201)
         fitted, u = curve.cubic.value(grid), curve.cubic.u(grid)
         measured, left = _dots(curve, curve.values), _dots(curve, curve.cubic.residuals)
-        band = Band(grid, fitted - 2.0 * u, fitted + 2.0 * u, colour=INK)
+        band = Area(grid, fitted - 2.0 * u, fitted + 2.0 * u, colour=INK)
         across = Axis("temperature [°C]" if number == len(curves) - 1 else "")
         heads = ("values and polynomial (band: ± 2 u)", "residuals") if number == 0 else ("", "")
         up = Axis(f"{curve.name}\n[{plain_unit(curve.unit)}]")

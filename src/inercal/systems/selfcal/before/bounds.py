@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation._jit import allocating, kernel, merged
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import SlopeRow, empty_row
 from inercal.systems.selfcal.filters.gaps import anew, walking
 from inercal.systems.selfcal.filters.problem import (
     FilterModel,
@@ -31,7 +31,7 @@ from inercal.systems.selfcal.filters.problem import (
 )
 from inercal.systems.selfcal.platform.coefficients import product_slope, to_linear
 from inercal.systems.selfcal.platform.kinematics import attitude
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.linearised import (
     Transition,
     decorrelated_row,
@@ -42,7 +42,7 @@ from inercal.systems.selfcal.platform.linearised import (
 )
 from inercal.systems.selfcal.platform.model import (
     WIDEST,
-    Base,
+    EncoderWorld,
     Rates,
     Room,
     accelerometers,
@@ -55,7 +55,7 @@ from inercal.systems.selfcal.platform.model import (
 )
 from inercal.systems.selfcal.platform.plan import CommandedMotion
 from inercal.systems.selfcal.platform.recording import Recording
-from inercal.systems.selfcal.platform.truth import Truth, simulate_truth
+from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -132,7 +132,7 @@ def nominal_attitudes(motion: CommandedMotion, problem: FilterProblem, c: Array,
     first = np.array(attitude(motion.angles[0], world.axes, world.signs))
     without, unused = np.zeros((n - 1, 1, 3)), np.empty((n, 3))
     above = np.zeros(n) if warm is None else warm
-    step, states, truth = np.diff(motion.t)[0], problem.states, Truth(q, unused, motion.angles.copy())
+    step, states, truth = np.diff(motion.t)[0], problem.states, PlatformTruth(q, unused, motion.angles.copy())
     simulate_truth(first, rate[:, None], step, without, above, states.full(c), states.layout, world, truth)
     return q
 
@@ -222,7 +222,7 @@ def _evenly(
 
 
 @kernel
-def _observe(P: Array, row: Row, size: int, r: float, source: int, work: Array) -> None:
+def _observe(P: Array, row: SlopeRow, size: int, r: float, source: int, work: Array) -> None:
     """Covariance ``P[0]`` and its parts ``P[1:]`` (m, m) after a scalar measurement, in place.
 
     ``row`` is its derivative by the state, ``r`` its variance, which belongs to the part ``source``; ``work`` (2, m) is
@@ -265,7 +265,9 @@ class Path(NamedTuple):
 
 
 @merged
-def arrived(path: Path, k: int, c: Array, base: Base, layout: Layout, own: Room) -> tuple[Transition, Rates]:
+def arrived(
+    path: Path, k: int, c: Array, base: EncoderWorld, layout: StateLayout, own: Room
+) -> tuple[Transition, Rates]:
     """The step to row ``k`` of a path, and the rates there; quantities of the rate in ``own``."""
     w, dt, warm, following = path.rate, path.dt[k - 1], path.warm[k], min(k, len(path.rate) - 1)
     at = (path.q[k, 0], path.q[k, 1], path.q[k, 2], path.q[k, 3])
@@ -322,7 +324,7 @@ def riccati(P: Array, path: Path, c: Array, model: FilterModel, u: Array) -> Non
                 accelerometers(at, read, warm[k], base, c, layout, own)
                 for i in range(3):
                     if seen[k, i] and admitted(i, gate, near):
-                        of_row = Row(layout.rows[i], own.entries[i])
+                        of_row = SlopeRow(layout.rows[i], own.entries[i])
                         _observe(P, of_row, layout.sizes[i], variance, _PARTS[0], work)
         if len(u) > 0:
             for i in range(u.shape[1]):

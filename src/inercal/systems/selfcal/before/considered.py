@@ -19,7 +19,7 @@ import numpy as np
 
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.kalman import Row, empty_row
+from inercal.foundation.inference.kalman import SlopeRow, empty_row
 from inercal.systems.selfcal.before.bounds import Path, arrived
 from inercal.systems.selfcal.filters.gaps import anew
 from inercal.systems.selfcal.filters.problem import (
@@ -199,11 +199,11 @@ def carry(P: Array, S: Array, path: Path, c: Array, model: FilterModel, slopes: 
             accelerometers(at, read, warm[k], base, c, layout, own)
             for i in range(3 if len(slopes) > 0 else 0):
                 if measured[k, i] and admitted(i, gate, near):
-                    of_row = Row(layout.rows[i], own.entries[i])
+                    of_row = SlopeRow(layout.rows[i], own.entries[i])
                     _shown(P, S, of_row, layout.sizes[i], variance, slopes[k, i])
             for i in range(3):
                 if measured[k, i] and admitted(i, gate, near):
-                    of_row = Row(layout.rows[i], own.entries[i])
+                    of_row = SlopeRow(layout.rows[i], own.entries[i])
                     _update(P, S, of_row, layout.sizes[i], variance, gain, shift[0])
 
 
@@ -218,7 +218,7 @@ def _forget(S: Array, place: Places, dt: float) -> None:
 
 
 @kernel
-def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> None:
+def _shown(P: Array, S: Array, row: SlopeRow, size: int, r: float, slope: Array) -> None:
     """Slopes (m,) of a normalised innovation of variance ``r`` beside that of the error state."""
     places, values, n, total = row.places, row.values, len(P), r
     for a in range(size):
@@ -232,7 +232,7 @@ def _shown(P: Array, S: Array, row: Row, size: int, r: float, slope: Array) -> N
 
 
 @kernel
-def _seen(S: Array, row: Row, size: int, n: int, out: Array) -> None:
+def _seen(S: Array, row: SlopeRow, size: int, n: int, out: Array) -> None:
     """Put into ``out`` (m,) what a ``row`` sees of each error: ``S`` (n, m) of the error state, and of itself."""
     out.fill(0.0)
     for a in range(size):
@@ -245,7 +245,7 @@ def _seen(S: Array, row: Row, size: int, n: int, out: Array) -> None:
 
 
 @kernel
-def _update(P: Array, S: Array, row: Row, size: int, r: float, gain: Array, shift: Array) -> None:
+def _update(P: Array, S: Array, row: SlopeRow, size: int, r: float, gain: Array, shift: Array) -> None:
     """Covariance and sensitivities after a scalar measurement of variance ``r``; ``gain`` (n,) and ``shift`` (m,) are
     used up."""
     places, values = row.places, row.values

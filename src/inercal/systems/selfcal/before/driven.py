@@ -7,7 +7,7 @@ from typing import NamedTuple
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, log, multiply
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.model import (
     base_of,
     bending,
@@ -42,7 +42,7 @@ def drive(
     noise: Array,
     warm: Array,
     c: Array,
-    layout: Layout,
+    layout: StateLayout,
     world: World,
     out: Driven,
 ) -> None:

@@ -15,7 +15,7 @@ from inercal.foundation.instruments.terms import sized
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.platform.coefficients import shown_units
-from inercal.systems.selfcal.platform.plan import Plan, motion
+from inercal.systems.selfcal.platform.plan import PlatformPlan, motion
 from inercal.systems.selfcal.settings import SelfcalSettings
 from inercal.systems.selfcal.still_joints import without_fixed
 
@@ -60,7 +60,7 @@ def verticals(settings: SelfcalSettings) -> Array:
     return up
 
 
-def _plan(settings: SelfcalSettings) -> Plan:
+def _plan(settings: SelfcalSettings) -> PlatformPlan:
     """The plan; raises `StudyError` without one."""
     if settings.plan is None:
         raise StudyError("plan", 'missing, expected a path such as path = "best"')

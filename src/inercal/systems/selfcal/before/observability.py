@@ -10,7 +10,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import UNSEEN, Learned, learned
-from inercal.foundation.results.remarks import Goal, at_prior, missed, reached
+from inercal.foundation.results.remarks import ReachedGoal, at_prior, missed, reached
 from inercal.foundation.results.shown import rounded
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.filters.filter_result import FilterResult
@@ -24,7 +24,7 @@ class Observability:
 
     bounds: PathBounds
     learned: Learned
-    goal: Mapping[str, Goal]
+    goal: Mapping[str, ReachedGoal]
 
     @property
     def to_goal(self) -> Mapping[str, float]:

@@ -20,7 +20,7 @@ from inercal.systems.selfcal.before.path_search import criterion, left_out, sear
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import beyond
-from inercal.systems.selfcal.platform.plan import PATHS, Move, Plan, Rest, Turn, motion, path
+from inercal.systems.selfcal.platform.plan import PATHS, Move, PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.settings import Search, SelfcalSettings
 from inercal.systems.selfcal.still_joints import without_fixed
 
@@ -36,7 +36,7 @@ class ComparedPath:
     is ``left_out``, as large as stated or usual, shifts the coefficients (p,)."""
 
     name: str
-    plan: Plan
+    plan: PlatformPlan
     observability: Observability
     criterion: float
     beyond: tuple[str, ...]
@@ -140,13 +140,13 @@ def design(
     )
 
 
-def lasting(plan: Plan, time: float) -> Plan:
+def lasting(plan: PlatformPlan, time: float) -> PlatformPlan:
     """The plan with a rest at the end that makes it last ``time`` [s]."""
     left = time - plan.duration
     return replace(plan, moves=(*plan.moves, Rest(left))) if left > plan.step / 2.0 else plan
 
 
-def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
+def with_stops(plan: PlatformPlan, angle: float, rate: float) -> PlatformPlan:
     """Multi-position calibration on the same path and of the same time: turns in parts of at most ``angle`` [rad] at a
     higher ``rate`` [rad/s], and rests of equal length after each. Raises ValueError where the turns alone take longer.
     """
@@ -163,7 +163,7 @@ def with_stops(plan: Plan, angle: float, rate: float) -> Plan:
     return lasting(stopping, plan.duration)
 
 
-def at_rest(plan: Plan) -> Mask:
+def at_rest(plan: PlatformPlan) -> Mask:
     """Rows (n, 4) measured at rest alone, for `inercal.systems.selfcal.before.bounds`."""
     resting = [isinstance(move, Rest) for move in plan.moves]
     rows = np.repeat([False, *resting], [1, *map(plan.steps, plan.moves)])
@@ -182,7 +182,7 @@ def stated_moves(moves: tuple[Move, ...]) -> list[list[str]]:
     return texts
 
 
-def _compared(name: str, plan: Plan, settings: SelfcalSettings) -> ComparedPath:
+def _compared(name: str, plan: PlatformPlan, settings: SelfcalSettings) -> ComparedPath:
     """A plan judged by its bounds."""
     commanded = motion(plan, settings.world)
     temperature = settings.simulated_temperature(len(commanded.t))

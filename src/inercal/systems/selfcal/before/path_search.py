@@ -27,7 +27,7 @@ from inercal.systems.selfcal.filters.problem import FilterProblem, problem
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import product_slope
 from inercal.systems.selfcal.platform.joint_limits import JointLimits, spans
-from inercal.systems.selfcal.platform.plan import CommandedMotion, Plan, Rest, Turn, motion
+from inercal.systems.selfcal.platform.plan import CommandedMotion, PlatformPlan, Rest, Turn, motion
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.platform.states import ALL, KIND_OF, WAVE
@@ -89,7 +89,7 @@ def search(
     settings: SelfcalSettings,
     progress: Callable[[int, int], None] = lambda done, total: None,
     executor: Executor | None = None,
-) -> Plan:
+) -> PlatformPlan:
     """The best path that the search finds within rate, time, number of turns, and limits of the joints.
 
     Time that no turn fills is a rest at the end. Rate, step and start are those of the study's plan, rates no more than
@@ -117,7 +117,7 @@ class PathGround:
     errors ``left_out`` that count, and what else limits the ``joints``."""
 
     asked: Search
-    model: Plan
+    model: PlatformPlan
     low: Array
     high: Array
     time: float
@@ -128,7 +128,7 @@ class PathGround:
     left_out: LeftOut
     joints: JointLimits
 
-    def plan(self, turns: Sequence) -> Plan:
+    def plan(self, turns: Sequence) -> PlatformPlan:
         """The plan of a sequence, with a rest at its end."""
         turning, step = self._turning(self.whole(turns)), self.model.step
         last = Rest(step * math.floor((self.time - turning.duration) / step + _EVEN))
@@ -137,7 +137,7 @@ class PathGround:
             turning = replace(turning, moves=turning.moves[:-1])
         return replace(turning, moves=(*turning.moves, last)) if last.duration > 0.0 else turning
 
-    def _turning(self, turns: Sequence) -> Plan:
+    def _turning(self, turns: Sequence) -> PlatformPlan:
         """The turns, each with its rest."""
         rests = (Rest(self.asked.rest),) if self.asked.rest > 0.0 else ()
         moves = (
@@ -239,7 +239,7 @@ class PathGround:
 def _ground(settings: SelfcalSettings) -> PathGround:
     """The ground of a study's search."""
     x, y, z = settings.fixed_angles.tolist()
-    asked, model = settings.search, replace(settings.plan or Plan((), start=(x, y, z)), moves=())
+    asked, model = settings.search, replace(settings.plan or PlatformPlan((), start=(x, y, z)), moves=())
     if asked.time is None and settings.plan is None:
         raise StudyError("design.time", "missing, expected a time or a plan that is as long")
     time = settings.plan.duration if asked.time is None and settings.plan else float(asked.time or 0.0)
@@ -272,7 +272,7 @@ def _ground(settings: SelfcalSettings) -> PathGround:
     return made
 
 
-def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float, FilterProblem]:
+def _coarse(settings: SelfcalSettings, model: PlatformPlan, unit: float) -> tuple[float, FilterProblem]:
     """Coarse step [s] for turns of ``unit`` [s], and the problem with the noise of a mean over such a step."""
     rows = min(
         max(1, round(unit / model.step)), max(1, math.ceil(settings.search.angle / LIMITS.search_turn))
@@ -285,7 +285,7 @@ def _coarse(settings: SelfcalSettings, model: Plan, unit: float) -> tuple[float,
     return coarse, replace(exact, noise=noise)
 
 
-def _limits(settings: SelfcalSettings, model: Plan) -> tuple[Array, Array]:
+def _limits(settings: SelfcalSettings, model: PlatformPlan) -> tuple[Array, Array]:
     """Limits (3,), (3,) of the angles from the start, in angles of the search."""
     level = math.pi * round(model.start[1] / math.pi)
     reach = math.acos(LIMITS.path_cosine)

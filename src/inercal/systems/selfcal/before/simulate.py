@@ -19,12 +19,12 @@ from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.platform.joint_limits import beyond
 from inercal.systems.selfcal.platform.kinematics import all_angles, attitude
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.plan import CommandedMotion, motion
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import World
 from inercal.systems.selfcal.platform.states import StateVector
-from inercal.systems.selfcal.platform.truth import Truth, simulate_truth
+from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
 from inercal.systems.selfcal.settings import Disturbances, Noise, SelfcalSettings
 
 
@@ -45,13 +45,13 @@ class Experiment:
     fixed: tuple[int, ...] = ()
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> StateLayout:
         """The layout of a truth, for kernels."""
         return StateVector((), self.truth).layout
 
 
 @dataclass(frozen=True, eq=False)
-class Simulated:
+class SimulatedPlatform:
     """A ``recording`` and its truth: ``attitude`` (n, 4) q_bp, ``angles`` (n, 3) [rad]."""
 
     recording: Recording
@@ -103,7 +103,7 @@ def _acting(commanded: CommandedMotion, m: int, delay: float) -> Array:
     return np.ascontiguousarray(np.diff(at, axis=0).reshape(n, m, 3) * (n * m) / (t[-1] - t[0]))
 
 
-def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
+def simulate(experiment: Experiment, rng: np.random.Generator) -> SimulatedPlatform:
     """Turn the platform once through its plan."""
     noise, other, t = experiment.noise, experiment.disturbances, experiment.motion.t
     n, step = len(t), float(t[1] - t[0])
@@ -140,7 +140,7 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> Simulated:
     recording = Recording(
         t, rate, measured, acc, bool(experiment.fixed), warm=experiment.warm, fixed=experiment.fixed
     )
-    made = Simulated(recording, q, th)
+    made = SimulatedPlatform(recording, q, th)
     if other.lost_rows == 0.0:
         return made
     return _rows(made, np.flatnonzero(np.append(True, rng.random(n - 1) >= other.lost_rows)))
@@ -163,7 +163,7 @@ def _commanded(experiment: Experiment, rng: np.random.Generator) -> tuple[Array,
     read = commanded.angles.copy()
     warm = np.zeros(n) if experiment.warm is None else experiment.warm
     simulate_truth(
-        q0, fine, dt, wander, warm, experiment.truth, experiment.layout, world, Truth(q, acc, read)
+        q0, fine, dt, wander, warm, experiment.truth, experiment.layout, world, PlatformTruth(q, acc, read)
     )
     all_angles(q, commanded.angles[0], world.axes, world.signs, th)
     return rate, q, acc, read if experiment.layout.read_off else th.copy(), th
@@ -202,7 +202,7 @@ def _swaying(experiment: Experiment, rng: np.random.Generator) -> Array:
     )
 
 
-def _rows(made: Simulated, rows: NDArray[np.int64]) -> Simulated:
+def _rows(made: SimulatedPlatform, rows: NDArray[np.int64]) -> SimulatedPlatform:
     """Some of the rows; the others are not in the file, with their rates."""
     whole = made.recording
     recording = replace(
@@ -213,7 +213,7 @@ def _rows(made: Simulated, rows: NDArray[np.int64]) -> Simulated:
         acc=whole.acc[rows],
         warm=None if whole.warm is None else whole.warm[rows],
     )
-    return Simulated(recording, made.attitude[rows], made.angles[rows])
+    return SimulatedPlatform(recording, made.attitude[rows], made.angles[rows])
 
 
 def _level(world: World) -> Array:

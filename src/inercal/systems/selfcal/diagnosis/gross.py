@@ -34,7 +34,7 @@ from inercal.foundation.records.checks.values import saturated
 from inercal.systems.selfcal.diagnosis.fit_quality import Case
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.limits import LIMITS
-from inercal.systems.selfcal.platform.plan import Plan
+from inercal.systems.selfcal.platform.plan import PlatformPlan
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS, Gimbals, World
 from inercal.systems.selfcal.settings import SelfcalSettings
@@ -345,7 +345,7 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
 
 
 def off_the_path(
-    recording: Recording, plan: Plan, world: World, began: float, rows: NDArray[np.int64]
+    recording: Recording, plan: PlatformPlan, world: World, began: float, rows: NDArray[np.int64]
 ) -> list[Finding]:
     """``truncated`` and ``contradiction``: a recording against the path of its study, which ``began`` at a time [s];
     ``rows`` (n,) of the file, from 0. Angles that make the attitude of the path are on it, also at gimbal lock."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.report.coefficients import budget, correlation
-from inercal.faces.report.courses import Course, converging, falling, lines_by_group
+from inercal.faces.report.courses import CoefficientCourse, converging, falling, lines_by_group
 from inercal.faces.report.html import Picture, render
 from inercal.faces.report.innovations import innovations, nis
 from inercal.foundation.arrays import Array
@@ -41,7 +41,7 @@ from inercal.systems.selfcal.task import compared
 
 if TYPE_CHECKING:
     from inercal.systems.selfcal.estimators import FilterKind
-    from inercal.systems.selfcal.filters.filter_result import FilterResult, History
+    from inercal.systems.selfcal.filters.filter_result import FilterResult, RowHistory
     from inercal.systems.selfcal.task import Calibration
 
 
@@ -121,7 +121,7 @@ def convergence(calibration: Calibration) -> list[Picture]:
     bound = np.sqrt(np.diag(to_filter @ bounds.covariance @ to_filter.T))
     units, size = shown_units(calibration.filtered.names)
     courses = [
-        Course(
+        CoefficientCourse(
             name,
             units[k],
             values[:, k] / size[k],
@@ -155,7 +155,7 @@ def convergence(calibration: Calibration) -> list[Picture]:
     ]
 
 
-def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
+def relative_errors(t: Array, history: RowHistory, truth: Array | None) -> Picture:
     """Relative errors of biases and misalignments of the accelerometers; relative changes where no truth is known."""
     values = to_product(history.coefficients)
     reference = values[-1] if truth is None else truth[: values.shape[1]]
@@ -178,7 +178,7 @@ def relative_errors(t: Array, history: History, truth: Array | None) -> Picture:
     )
 
 
-def _attitude(calibration: Calibration, history: History, truth: Array | None) -> list[Picture]:
+def _attitude(calibration: Calibration, history: RowHistory, truth: Array | None) -> list[Picture]:
     """The attitude against the truth where that is known, else against the encoders; and filters that were compared
     against the paper's, or the one that counts."""
     t, th, own = calibration.recording.t, calibration.recording.th, calibration.filtered.kind

@@ -10,7 +10,7 @@ from inercal.faces.report.courses import panels_of_lines, path, turning
 from inercal.faces.report.html import Picture
 from inercal.faces.report.marks import Axis, Dots, Level, Mark, Panel, Strips
 from inercal.faces.report.panels import draw
-from inercal.faces.report.rig import Triad, Turn, rig
+from inercal.faces.report.rig import DrawnTriad, DrawnTurn, rig
 from inercal.faces.report.style import ALARM, COLOURS, QUIET, plain_unit, power_of_ten
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.shown import rounded
@@ -33,7 +33,7 @@ def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
     """Three gimbals on their base at zero angles: outer, inner and platform axis, and the axes of the platform."""
     to_geographic = base.from_geographic().T
     joints = [
-        Turn(name, sign * to_geographic[:, "xyz".index(axis)])
+        DrawnTurn(name, sign * to_geographic[:, "xyz".index(axis)])
         for name, axis, sign in zip(JOINTS, gimbals.axes, gimbals.signs, strict=True)
     ]
     return rig(
@@ -42,7 +42,7 @@ def gimbals_on_base(base: Base, gimbals: Gimbals) -> Picture:
         "the platform, each plus along its arrow; X_p, Y_p, Z_p the axes of the platform. Compare with the rig: an "
         "axis in another place or an angle that counts the other way shows here first.",
         joints,
-        Triad(("X_p", "Y_p", "Z_p"), np.asarray(to_geographic)),
+        DrawnTriad(("X_p", "Y_p", "Z_p"), np.asarray(to_geographic)),
     )
 
 

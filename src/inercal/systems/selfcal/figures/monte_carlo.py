@@ -9,7 +9,7 @@ import numpy as np
 
 from inercal.faces.report.html import Picture
 from inercal.faces.report.html import page as framed
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Line, Mark, Panel, Strips
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Panel, Strips
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, INK, QUIET
 from inercal.foundation.arrays import Array
@@ -81,7 +81,7 @@ def _chi_square(title: str, caption: str, values: Array, dof: float, divisor: fl
     marks: list[Mark] = []
     if len(values):
         share = np.histogram(np.minimum(values, far), edges)[0] / (len(values) * np.diff(edges))
-        marks.append(Band(edges, np.zeros(len(share)), share, "runs", alpha=0.55, steps=True))
+        marks.append(Area(edges, np.zeros(len(share)), share, "runs", alpha=0.55, steps=True))
     x = np.linspace(first, last, 200)
     marks.append(Line(x, divisor * chi2.pdf(divisor * x, dof), "chi-square", INK, 1.1))
     beyond = int(np.sum(values > far))

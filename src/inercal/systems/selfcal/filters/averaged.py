@@ -27,9 +27,9 @@ from inercal.systems.selfcal.filters.gaps import doubtful
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.limits import LIMITS
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.model import (
-    Base,
+    EncoderWorld,
     Rates,
     Room,
     accelerometers,
@@ -63,7 +63,7 @@ def averaged(
     acc[waiting[~read[waiting]]] = np.nan  # as in the filter
     rows = _Rows(recording.t, recording.rate, acc, recording.th, warm)
     middle = _middle(read, m, count)
-    out = _Means(np.empty((count, 3)), np.empty((count, 3)), np.empty((count - 1, 3)))
+    out = _BlockMeans(np.empty((count, 3)), np.empty((count, 3)), np.empty((count - 1, 3)))
     full = problem.states.full(found.coefficients)
     q = found.history.attitude
     _average(q, rows, middle, m, full, problem.states.layout, problem.world, out)
@@ -106,7 +106,7 @@ def load_kernels(problem: FilterProblem) -> None:
         full,
         problem.states.layout,
         problem.world,
-        _Means(none, none, none),
+        _BlockMeans(none, none, none),
     )
 
 
@@ -135,7 +135,7 @@ class _Rows(NamedTuple):
     warm: Array
 
 
-class _Means(NamedTuple):
+class _BlockMeans(NamedTuple):
     """Of b blocks: ``acc`` (b, 3) [m/s^2]; ``turned`` (b, 3) [rad] of the mean of the encoders against their reading at
     the middle row, about the axes of p; ``rate`` (b - 1, 3) [rad/s] from one middle row to the next."""
 
@@ -151,9 +151,9 @@ def _average(
     middle: NDArray[np.int64],
     m: int,
     c: Array,
-    layout: Layout,
+    layout: StateLayout,
     world: World,
-    out: _Means,
+    out: _BlockMeans,
 ) -> None:
     """Means over blocks of ``m`` rows about their ``middle`` ones; ``q`` (n, 4) attitudes, ``c`` the full vector."""
     t, rate = rows.t, rows.rate
@@ -205,7 +205,14 @@ def _average(
 
 @merged
 def _moved(
-    q: Quaternion, rows: _Rows, step: int, way: float, base: Base, c: Array, layout: Layout, own: Room
+    q: Quaternion,
+    rows: _Rows,
+    step: int,
+    way: float,
+    base: EncoderWorld,
+    c: Array,
+    layout: StateLayout,
+    own: Room,
 ) -> Quaternion:
     """The attitude after a step, or before it where ``way`` is -1."""
     w, dt = (

@@ -35,9 +35,9 @@ from inercal.foundation.geometry.rotations import (
 )
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.gaps import broken
-from inercal.systems.selfcal.filters.problem import FilterProblem, Start, encoders_at
+from inercal.systems.selfcal.filters.problem import AttitudeStart, FilterProblem, encoders_at
 from inercal.systems.selfcal.filters.residuals import (
-    Measurements,
+    RowMeasurements,
     Sensed,
     batch_result,
     first_reading,
@@ -61,7 +61,7 @@ _ITERATIONS = 30
 
 
 def estimate_map(
-    recording: Recording, problem: FilterProblem, start: Start | None = None, history: bool = True
+    recording: Recording, problem: FilterProblem, start: AttitudeStart | None = None, history: bool = True
 ) -> FilterResult:
     """Maximum a posteriori over all attitudes and coefficients; measurements missing or stopped by the gate left out.
 
@@ -107,7 +107,7 @@ def estimate_map(
 
 
 def _first_guess(
-    recording: Recording, problem: FilterProblem, measured: Measurements, start: Start | None
+    recording: Recording, problem: FilterProblem, measured: RowMeasurements, start: AttitudeStart | None
 ) -> Array:
     """Attitudes (n, 4) to begin with: the encoders', carried by the commands where silent."""
     seen = np.append(start is None, np.all(np.isfinite(recording.th[1:]), axis=1))
@@ -143,8 +143,8 @@ def _terms_at(
     c: Array,
     recording: Recording,
     problem: FilterProblem,
-    measured: Measurements,
-    start: Start,
+    measured: RowMeasurements,
+    start: AttitudeStart,
     loose: Sequence[int] = (),
     of_encoders: bool = False,
 ) -> _Terms:
@@ -176,7 +176,9 @@ def _terms_at(
     )
 
 
-def _at_encoders(recording: Recording, problem: FilterProblem, c: Array, start: Start) -> tuple[Start, Array]:
+def _at_encoders(
+    recording: Recording, problem: FilterProblem, c: Array, start: AttitudeStart
+) -> tuple[AttitudeStart, Array]:
     """The start at the first reading of the encoders as the states have it, and its change (3, p) by these; with the
     turn within the prior of a delay added to its sigma."""
     q, slope = encoders_at(problem, recording.th[0], c, recording.rate[0])
@@ -185,7 +187,7 @@ def _at_encoders(recording: Recording, problem: FilterProblem, c: Array, start: 
     if late >= 0:
         sigma = math.hypot(sigma, float(np.linalg.norm(slope[:, late])) * problem.prior[late])
         slope[:, late] = 0.0
-    return Start(q, sigma), slope
+    return AttitudeStart(q, sigma), slope
 
 
 class _GaussNewtonStep(NamedTuple):
@@ -248,7 +250,7 @@ def _step(terms: _Terms, attitude_u: bool) -> _GaussNewtonStep:
     )
 
 
-def _per_row(terms: _Terms, measured: Measurements) -> Array:
+def _per_row(terms: _Terms, measured: RowMeasurements) -> Array:
     """Squared residuals of each measured row, of the steps since the one before, and a share of those of the prior."""
     total = np.cumsum(np.sum(terms.sensed.residual**2, axis=1) + np.sum(terms.process**2, axis=1))
     nis, rows = np.full(len(total), np.nan), np.flatnonzero(measured.dims)

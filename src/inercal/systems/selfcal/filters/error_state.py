@@ -15,12 +15,18 @@ import numpy as np
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, log, multiply, normalize
-from inercal.foundation.inference.kalman import Row, empty_row, innovation_variance, scalar_update
-from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.foundation.inference.kalman import SlopeRow, empty_row, innovation_variance, scalar_update
+from inercal.systems.selfcal.filters.filter_result import (
+    Estimates,
+    FilterState,
+    Trace,
+    empty_estimates,
+    remember,
+)
 from inercal.systems.selfcal.filters.problem import (
+    AttitudeStart,
     FilterModel,
     FilterProblem,
-    Start,
     admitted,
     apart,
     encoders_at,
@@ -55,8 +61,8 @@ from inercal.systems.selfcal.platform.states import LEVER, TAU
 
 
 def initial(
-    problem: FilterProblem, th: Array, start: Start | None = None, rate: Array | None = None
-) -> State:
+    problem: FilterProblem, th: Array, start: AttitudeStart | None = None, rate: Array | None = None
+) -> FilterState:
     """The state before the first step: the states at their mean with the prior, the attitude that of encoders which
     read ``th`` (3,) or ``start``; ``rate`` (3,) [rad/s] is the first one read."""
     p = len(problem.prior)
@@ -64,13 +70,15 @@ def initial(
     sigma = problem.noise.encoder if start is None else start.sigma
     covariance = np.zeros((3 + p, 3 + p))
     covariance[3:, 3:] = np.diag(problem.prior**2)
-    begun = State(
+    begun = FilterState(
         np.empty(4), problem.mean.copy(), covariance, np.zeros(3, dtype=np.int64), np.array(th, dtype=float)
     )
     return with_attitude(begun, problem, q, sigma, np.zeros(3) if rate is None else rate)
 
 
-def with_attitude(state: State, problem: FilterProblem, q: Array | None, sigma: float, rate: Array) -> State:
+def with_attitude(
+    state: FilterState, problem: FilterProblem, q: Array | None, sigma: float, rate: Array
+) -> FilterState:
     """The state with an attitude ``q`` (4,) known to ``sigma`` [rad], or else that of the encoders, whose errors are
     those of the states; coefficients and their covariance stay. Encoders that are late are taken to be so by less than
     the platform turns at ``rate`` (3,) [rad/s] in the prior of the delay."""
@@ -90,7 +98,9 @@ def with_attitude(state: State, problem: FilterProblem, q: Array | None, sigma: 
     return state._replace(attitude=np.array(q), covariance=P)
 
 
-def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
+def advance(
+    state: FilterState, problem: FilterProblem, steps: Steps, history: bool = True
+) -> tuple[FilterState, Trace]:
     """Take the filter through m steps; the arrays of ``state`` become those of the new one. Without ``history`` the
     trace holds no more than the normalised innovations squared."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
@@ -150,7 +160,7 @@ def _encoder_update(
     x: Array,
     columns: Places,
     axes: Array,
-    row: Row,
+    row: SlopeRow,
     work: Array,
     innovations: Array,
 ) -> float:
@@ -174,7 +184,7 @@ def _encoder_update(
 
 
 @allocating
-def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> float:
+def _advance(state: FilterState, model: FilterModel, steps: Steps, out: Estimates) -> float:
     """The loop; returns the least |cos thy|."""
     estimated, P, near, angles = state.coefficients, state.covariance, state.near, state.th
     world, noise, gate, layout = model
@@ -238,12 +248,12 @@ def _advance(state: State, model: FilterModel, steps: Steps, out: Estimates) -> 
                 of_acc = (of_acc if late else variance) + _shaken(P, c, place, read, dt)
             for i in range(3):
                 if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    of_row = Row(layout.rows[i], own.entries[i])
+                    of_row = SlopeRow(layout.rows[i], own.entries[i])
                     spread = innovation_variance(P, of_row, layout.sizes[i], of_acc)
                     out.innovations[k, i] = (acc[k, i] - expected[i]) / math.sqrt(spread)
             for i in range(3):
                 if not math.isnan(acc[k, i]) and admitted(i, gate, near):
-                    of_row = Row(layout.rows[i], own.entries[i])
+                    of_row = SlopeRow(layout.rows[i], own.entries[i])
                     z = acc[k, i] - expected[i]
                     total += scalar_update(P, x, of_row, layout.sizes[i], z, of_acc, work)
                     count += 1

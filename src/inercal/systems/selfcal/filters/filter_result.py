@@ -20,7 +20,7 @@ from inercal.systems.selfcal.platform.coefficients import product_slope, to_prod
 from inercal.systems.selfcal.platform.kinematics import attitude
 
 
-class State(NamedTuple):
+class FilterState(NamedTuple):
     """State of a recursive filter between two rows.
 
     ``attitude`` (4,) q_bp, or gimbal angles (3,) [rad] of the gimbal-ukf; ``coefficients`` (p,), linear form; their
@@ -36,8 +36,8 @@ class State(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """Estimates after each of m steps, as in `History` and `FilterResult`; without a history no rows but of ``nis`` and
-    ``dims``."""
+    """Estimates after each of m steps, as in `RowHistory` and `FilterResult`; without a history no rows but of ``nis``
+    and ``dims``."""
 
     attitude: Array
     attitude_u: Array
@@ -87,7 +87,7 @@ class Trace(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class RowHistory:
     """From row to row, the first row the start.
 
     ``attitude`` (n, 4) q_bp and its standard deviations ``attitude_u`` (n, 3) [rad, about the axes of p; of the gimbal
@@ -101,7 +101,7 @@ class History:
     u: Array
 
 
-def estimate_of(state: State, problem: FilterProblem) -> History:
+def estimate_of(state: FilterState, problem: FilterProblem) -> RowHistory:
     """The estimate of a state, as the one row of a history."""
     with np.errstate(invalid="ignore"):  # NaN of a filter that fails, which is said
         u = np.sqrt(np.diag(state.covariance))
@@ -112,10 +112,10 @@ def estimate_of(state: State, problem: FilterProblem) -> History:
         with np.errstate(invalid="ignore"):
             of_attitude = 2.0 * np.sqrt(np.einsum("ij,jk,ik->i", across, state.covariance[:4, :4], across))
     of_coefficients = u[-len(problem.prior) :]
-    return History(q[None], of_attitude[None], state.coefficients[None].copy(), of_coefficients[None])
+    return RowHistory(q[None], of_attitude[None], state.coefficients[None].copy(), of_coefficients[None])
 
 
-def attitude_of(state: State, problem: FilterProblem) -> Array:
+def attitude_of(state: FilterState, problem: FilterProblem) -> Array:
     """q_bp of a state."""
     if len(state.attitude) == 4:
         return state.attitude.copy()
@@ -147,7 +147,7 @@ class FilterResult:
     nis: Array
     dims: NDArray[np.int64]
     innovations: Array
-    history: History | None
+    history: RowHistory | None
     seconds: float
     converged: bool = True
     message: str = ""
@@ -155,7 +155,7 @@ class FilterResult:
     fallbacks: int = 0
     gimbal_cosine: float = 1.0
     restarts: tuple[int, ...] = ()
-    state: State | None = None
+    state: FilterState | None = None
 
     @property
     def steps(self) -> int:

@@ -28,12 +28,12 @@ from inercal.systems.selfcal.filters import error_state
 from inercal.systems.selfcal.filters.filter_result import (
     Estimates,
     FilterResult,
-    State,
+    FilterState,
     Trace,
     empty_estimates,
     estimate_of,
 )
-from inercal.systems.selfcal.filters.problem import FilterProblem, Start, encoders_at
+from inercal.systems.selfcal.filters.problem import AttitudeStart, FilterProblem, encoders_at
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.kinematics import attitude, nearest_turn
 from inercal.systems.selfcal.platform.recording import Recording, Steps
@@ -115,13 +115,13 @@ def _last(complete: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def advance(
     module: ModuleType,
-    state: State,
+    state: FilterState,
     problem: FilterProblem,
     steps: Steps,
     held: Sequence[int],
     history: bool = True,
     walked: Array | None = None,
-) -> tuple[State, Trace]:
+) -> tuple[FilterState, Trace]:
     """Take a recursive filter through m steps, of which those ``held`` are guesses; other arguments as of
     `inercal.systems.selfcal.filters.error_state.advance`.
 
@@ -139,7 +139,9 @@ def advance(
             state, trace = module.advance(state, problem, steps.part(slice(done, k)), history)
             parts.append(trace)
         unmeasured = step._replace(acc=nothing, th=nothing)
-        own = State._make(each.copy() for each in state)  # as a filter uses up the arrays that it is given
+        own = FilterState._make(
+            each.copy() for each in state
+        )  # as a filter uses up the arrays that it is given
         restless = problem if walked is None else walking(problem, walked[k] / steps.dt[k])
         propagated, trace = module.advance(own, restless, unmeasured, history)
         if not seen[k]:
@@ -156,11 +158,11 @@ def advance(
 
 
 def initial(
-    module: ModuleType, problem: FilterProblem, th: Array, rate: Array, start: Start | None = None
-) -> State:
+    module: ModuleType, problem: FilterProblem, th: Array, rate: Array, start: AttitudeStart | None = None
+) -> FilterState:
     """The state of a recursive filter at a first row: angles ``th`` (3,) [rad], rate (3,) [rad/s] from there on."""
     of_rig = (rate,) if problem.states.of_rig else ()
-    state: State = module.initial(problem, th, start, *of_rig)
+    state: FilterState = module.initial(problem, th, start, *of_rig)
     return state
 
 
@@ -179,7 +181,7 @@ def doubtful(held: Sequence[int], th: Array) -> list[int]:
     return [int(k) for k in np.flatnonzero(doubt)]
 
 
-def broken(recording: Recording, problem: FilterProblem, start: Start | None = None) -> list[int]:
+def broken(recording: Recording, problem: FilterProblem, start: AttitudeStart | None = None) -> list[int]:
     """Steps held that the encoders contradict, as the error-state filter sees it."""
     if not recording.held:
         return []
@@ -204,28 +206,28 @@ def taken_anew(recording: Recording, result: FilterResult) -> list[Finding]:
     return [Finding("gap", text, f"t = {counted_names([f'{each:.10g} s' for each in recording.t[rows]])}")]
 
 
-def _contradicted(state: State, problem: FilterProblem, th: Array) -> bool:
+def _contradicted(state: FilterState, problem: FilterProblem, th: Array) -> bool:
     """True where encoder readings (3,) [rad] are far from the attitude of a state that has not seen them."""
     expected, read = estimate_of(state, problem), encoders_at(problem, th, state.coefficients, np.zeros(3))[0]
     limit = LIMITS.held_sigmas * np.hypot(expected.attitude_u[0], anew(problem, th).sigma)
     return bool((np.abs(boxminus(read, expected.attitude[0])) > limit).any())
 
 
-def anew(problem: FilterProblem, th: Array) -> Start:
+def anew(problem: FilterProblem, th: Array) -> AttitudeStart:
     """The attitude that encoders (3,) [rad] read, with the most that they leave uncertain about any axis:
     ``1 + |sin thy|`` is the largest eigenvalue of ``J J^T``."""
     q = np.array(attitude(th, problem.world.axes, problem.world.signs))
-    return Start(q, problem.noise.encoder * math.sqrt(1.0 + abs(math.sin(th[1]))))
+    return AttitudeStart(q, problem.noise.encoder * math.sqrt(1.0 + abs(math.sin(th[1]))))
 
 
 def _anew(
-    module: ModuleType, state: State, problem: FilterProblem, step: Steps, history: bool
-) -> tuple[State, Trace]:
+    module: ModuleType, state: FilterState, problem: FilterProblem, step: Steps, history: bool
+) -> tuple[FilterState, Trace]:
     """The state with its attitude as encoders read it after one step, and the trace of that row, without an update."""
     p, th = len(problem.prior), step.th[0]
     on_turn = np.array([nearest_turn(*each) for each in zip(th, state.th, strict=True)])
     start = anew(problem, on_turn)
-    begun: State = module.initial(problem, on_turn, start)
+    begun: FilterState = module.initial(problem, on_turn, start)
     begun.covariance[-p:, -p:] = state.covariance[-p:, -p:]
     state = begun._replace(coefficients=state.coefficients, near=state.near)
     if problem.states.of_rig:

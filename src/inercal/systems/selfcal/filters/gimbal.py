@@ -33,12 +33,18 @@ from inercal.foundation.inference.sigma_point import (
     weights,
 )
 from inercal.systems.selfcal.estimators import FACTOR_OF
-from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates, remember
+from inercal.systems.selfcal.filters.filter_result import (
+    Estimates,
+    FilterState,
+    Trace,
+    empty_estimates,
+    remember,
+)
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.systems.selfcal.filters.problem import (
+    AttitudeStart,
     FilterModel,
     FilterProblem,
-    Start,
     admitted,
     updating,
     watch,
@@ -51,7 +57,7 @@ from inercal.systems.selfcal.platform.rig import World
 Cosines: TypeAlias = tuple[float, float, float, float, float, float]
 
 
-def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:
+def initial(problem: FilterProblem, th: Array, start: AttitudeStart | None = None) -> FilterState:
     """The state before the first step: coefficients 0 with the prior, angles ``th`` (3,) or those of ``start``."""
     world, p = problem.world, len(problem.prior)
     read = np.array(th, dtype=float)
@@ -59,10 +65,12 @@ def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> St
     if start is not None:
         sigma, at = start.sigma, np.array(angles(start.attitude, read, world.axes, world.signs))
     covariance = np.diag(np.concatenate([np.full(3, sigma**2), problem.prior**2]))
-    return State(at, np.zeros(p), covariance, np.zeros(3, dtype=np.int64), read)
+    return FilterState(at, np.zeros(p), covariance, np.zeros(3, dtype=np.int64), read)
 
 
-def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
+def advance(
+    state: FilterState, problem: FilterProblem, steps: Steps, history: bool = True
+) -> tuple[FilterState, Trace]:
     """Take the filter through m steps, as `inercal.systems.selfcal.filters.error_state.advance` does."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
     factor = FACTORS[problem.filter.factor or FACTOR_OF["gimbal-ukf"]]
@@ -227,7 +235,7 @@ def _read(
 
 @allocating
 def _advance(
-    state: State, model: FilterModel, factor: int, euler: bool, steps: Steps, out: Estimates
+    state: FilterState, model: FilterModel, factor: int, euler: bool, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     th, c, P, level, read = state.attitude, state.coefficients, state.covariance, state.near, state.th

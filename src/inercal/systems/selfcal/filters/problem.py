@@ -18,7 +18,7 @@ from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector
 from inercal.systems.selfcal.estimators import ESTIMATORS, FilterKind
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.linearised import AXES, FLOOR, STIFF
 from inercal.systems.selfcal.platform.model import Rates, Room, base_of, encoders, room
 from inercal.systems.selfcal.platform.rig import World
@@ -112,7 +112,7 @@ class FilterModel(NamedTuple):
     world: World
     noise: NoiseLevels
     gate: Gate
-    layout: Layout
+    layout: StateLayout
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ def problem(settings: SelfcalSettings) -> FilterProblem:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class AttitudeStart:
     """A start other than the first encoder reading: ``attitude`` (4,) q_bp at the first row, and its standard deviation
     ``sigma`` [rad] about each axis.
 
@@ -198,7 +198,9 @@ def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tup
 
 
 @allocating
-def _encoders_at(th: Array, rate: Array, c: Array, layout: Layout, world: World, own: Room) -> Quaternion:
+def _encoders_at(
+    th: Array, rate: Array, c: Array, layout: StateLayout, world: World, own: Room
+) -> Quaternion:
     """The attitude (4,) of encoders, for `encoders_at`; its columns in ``own``."""
     w, base = (rate[0], rate[1], rate[2]), base_of(c, layout.based, world)
     q = encoders(th, Rates(w, w), base, c, layout, world, own)

@@ -34,12 +34,12 @@ from inercal.foundation.inference.sigma_point import (
     weights,
 )
 from inercal.systems.selfcal.estimators import FACTOR_OF
-from inercal.systems.selfcal.filters.filter_result import Estimates, State, Trace, empty_estimates
+from inercal.systems.selfcal.filters.filter_result import Estimates, FilterState, Trace, empty_estimates
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.systems.selfcal.filters.problem import (
+    AttitudeStart,
     FilterModel,
     FilterProblem,
-    Start,
     admitted,
     updating,
     watch,
@@ -52,7 +52,7 @@ from inercal.systems.selfcal.platform.rig import World
 Columns: TypeAlias = tuple[Quaternion, Quaternion, Quaternion]
 
 
-def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> State:
+def initial(problem: FilterProblem, th: Array, start: AttitudeStart | None = None) -> FilterState:
     """The state before the first step: coefficients 0 with the prior, the attitude of angles ``th`` (3,) or ``start``.
 
     The quaternion is uncertain by sigma / 2 across, and by 1e-4 of that along itself, lest a factor fails at once.
@@ -64,10 +64,12 @@ def initial(problem: FilterProblem, th: Array, start: Start | None = None) -> St
     # Xi Xi^T = 1 - q q^T
     P[:4, :4] = (0.5 * sigma) ** 2 * (np.eye(4) - (1.0 - 1e-8) * np.outer(q, q))
     P[4:, 4:] = np.diag(problem.prior**2)
-    return State(q, np.zeros(p), P, np.zeros(3, dtype=np.int64), np.array(th, dtype=float))
+    return FilterState(q, np.zeros(p), P, np.zeros(3, dtype=np.int64), np.array(th, dtype=float))
 
 
-def advance(state: State, problem: FilterProblem, steps: Steps, history: bool = True) -> tuple[State, Trace]:
+def advance(
+    state: FilterState, problem: FilterProblem, steps: Steps, history: bool = True
+) -> tuple[FilterState, Trace]:
     """Take the filter through m steps, as `inercal.systems.selfcal.filters.error_state.advance` does."""
     out = empty_estimates(len(steps.dt), len(problem.prior), history)
     factor = FACTORS[problem.filter.factor or FACTOR_OF["svd-qukf"]]
@@ -196,7 +198,7 @@ def _propagate(
 
 @allocating
 def _advance(
-    state: State, model: FilterModel, factor: int, steps: Steps, out: Estimates
+    state: FilterState, model: FilterModel, factor: int, steps: Steps, out: Estimates
 ) -> tuple[float, int, float]:
     """The loop; returns the lowest eigenvalue, the number of fallbacks, the least |cos thy|."""
     c, P, near, angles = state.coefficients, state.covariance, state.near, state.th

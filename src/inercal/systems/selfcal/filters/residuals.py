@@ -23,8 +23,15 @@ from inercal.foundation.geometry.rotations import (
     multiply,
     rotate,
 )
-from inercal.systems.selfcal.filters.filter_result import FilterResult, History
-from inercal.systems.selfcal.filters.problem import FilterProblem, Start, admitted, apart, updating, watch
+from inercal.systems.selfcal.filters.filter_result import FilterResult, RowHistory
+from inercal.systems.selfcal.filters.problem import (
+    AttitudeStart,
+    FilterProblem,
+    admitted,
+    apart,
+    updating,
+    watch,
+)
 from inercal.systems.selfcal.platform.linearised import LinearisedRows, linearise_rows, linearise_steps
 from inercal.systems.selfcal.platform.recording import Recording, Steps
 from inercal.systems.selfcal.platform.rig import World
@@ -32,7 +39,7 @@ from inercal.systems.selfcal.platform.states import LEVER
 
 
 @dataclass(frozen=True, eq=False)
-class Measurements:
+class RowMeasurements:
     """Measurements of m rows; those missing or stopped by the near-level gate weigh nothing.
 
     ``acc`` (m, 3) [m/s^2], 0 where missing, with reciprocal standard deviations ``acc_weight``; ``attitude`` (m, 4)
@@ -56,7 +63,7 @@ class Measurements:
         return np.asarray(np.count_nonzero(self.used, axis=1))
 
 
-def readings(recording: Recording, problem: FilterProblem) -> Measurements:
+def readings(recording: Recording, problem: FilterProblem) -> RowMeasurements:
     """The measurements of all rows but the first."""
     acc, th = recording.acc[1:], recording.th[1:]
     seen = np.all(np.isfinite(th), axis=1)
@@ -69,7 +76,7 @@ def readings(recording: Recording, problem: FilterProblem) -> Measurements:
     floor = np.array([apart(noise, dt, noise.encoder) for dt in recording.dt])[:, None, None]
     of_joints = noise.encoder**2 * joints * noise.joints @ np.swapaxes(joints, 1, 2)
     root = np.asarray(np.linalg.cholesky(of_joints + floor * np.eye(3)), dtype=np.float64)
-    return Measurements(
+    return RowMeasurements(
         np.where(used[:, :3], acc, 0.0),
         used[:, :3] / _accelerometer_noise(recording, problem),
         attitude,
@@ -119,7 +126,7 @@ def _gate(attitude: Array, seen: NDArray[np.bool_], problem: FilterProblem) -> N
     return passed
 
 
-def normalised(residual: Array, measured: Measurements) -> Array:
+def normalised(residual: Array, measured: RowMeasurements) -> Array:
     """Residuals (m, 6), whitened, each over its own standard deviation instead; NaN where not measured."""
     encoders = np.einsum("kij,kj->ki", measured.root, residual[:, 3:])
     deviation = np.sqrt(np.sum(measured.root**2, axis=2))
@@ -129,7 +136,7 @@ def normalised(residual: Array, measured: Measurements) -> Array:
 def batch_result(
     recording: Recording,
     problem: FilterProblem,
-    measured: Measurements,
+    measured: RowMeasurements,
     path: tuple[Array, Array],
     coefficients: tuple[Array, Array],
     nis: Array,
@@ -144,7 +151,7 @@ def batch_result(
     (c, covariance), rows = coefficients, len(recording.t)
     history = None
     if innovations is not None:
-        history = History(*path, np.tile(c, (rows, 1)), np.tile(np.sqrt(np.diag(covariance)), (rows, 1)))
+        history = RowHistory(*path, np.tile(c, (rows, 1)), np.tile(np.sqrt(np.diag(covariance)), (rows, 1)))
     cosine = np.abs(np.cos(recording.th[:, 1]))
     return FilterResult(
         kind="map",
@@ -163,9 +170,9 @@ def batch_result(
     )
 
 
-def first_reading(recording: Recording, problem: FilterProblem) -> Start:
+def first_reading(recording: Recording, problem: FilterProblem) -> AttitudeStart:
     """The attitude of the first encoder reading."""
-    return Start(gimbals(recording.th[:1], problem.world)[0][0], problem.noise.encoder)
+    return AttitudeStart(gimbals(recording.th[:1], problem.world)[0][0], problem.noise.encoder)
 
 
 class Sensed(NamedTuple):
@@ -177,7 +184,7 @@ class Sensed(NamedTuple):
     by_coefficients: Array
 
 
-def sensed(q: Array, c: Array, measured: Measurements, problem: FilterProblem) -> Sensed:
+def sensed(q: Array, c: Array, measured: RowMeasurements, problem: FilterProblem) -> Sensed:
     """Compare measurements with attitudes (m, 4) and coefficients (p,)."""
     m, states = len(q), problem.states
     of_encoders, expected, by = np.empty((m, 4)), np.empty((m, 3)), np.zeros((m, 6, 3 + len(c)))

@@ -15,15 +15,15 @@ from inercal.systems.selfcal.filters import error_state, gimbal, quaternion
 from inercal.systems.selfcal.filters.batch import estimate_map
 from inercal.systems.selfcal.filters.filter_result import (
     FilterResult,
-    History,
-    State,
+    FilterState,
+    RowHistory,
     Trace,
     attitude_of,
     empty_estimates,
     estimate_of,
 )
 from inercal.systems.selfcal.filters.gaps import advance, initial, joined
-from inercal.systems.selfcal.filters.problem import FilterProblem, Start
+from inercal.systems.selfcal.filters.problem import AttitudeStart, FilterProblem
 from inercal.systems.selfcal.filters.second_pass import is_due, second_pass
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.recording import Recording, Steps
@@ -41,7 +41,7 @@ def estimate(
     recording: Recording,
     problem: FilterProblem,
     kind: FilterKind | None = None,
-    start: Start | None = None,
+    start: AttitudeStart | None = None,
     history: bool = True,
     brief: bool = False,
     courses: bool = True,
@@ -95,12 +95,12 @@ _CHUNK = 1 << 16
 
 def _passed(
     module: ModuleType,
-    state: State,
+    state: FilterState,
     problem: FilterProblem,
     recording: Recording,
     history: bool,
     courses: bool,
-) -> tuple[State, Trace, History | None]:
+) -> tuple[FilterState, Trace, RowHistory | None]:
     """The state after all steps, innovations and health, and estimates of the rows, without ``courses`` attitudes."""
     steps, m, p = recording.steps, len(recording.dt), len(problem.prior)
     seen = np.all(np.isfinite(steps.th), axis=1)
@@ -128,7 +128,7 @@ def _passed(
         restarts += [first + k for k in trace.restarts]
         first = last
     trace = joined(health)._replace(estimates=out, restarts=tuple(restarts))
-    return state, trace, History(**rows) if history else None
+    return state, trace, RowHistory(**rows) if history else None
 
 
 def load_kernels(kind: FilterKind, problem: FilterProblem) -> None:

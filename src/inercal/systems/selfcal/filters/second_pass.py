@@ -24,7 +24,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import boxplus, normalize
 from inercal.systems.selfcal.estimators import FilterKind
 from inercal.systems.selfcal.filters import error_state
-from inercal.systems.selfcal.filters.filter_result import State
+from inercal.systems.selfcal.filters.filter_result import FilterState
 from inercal.systems.selfcal.filters.gaps import advance, initial
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.limits import LIMITS
@@ -38,13 +38,13 @@ def is_due(kind: FilterKind, problem: FilterProblem) -> bool:
 
 
 def second_pass(
-    begun: State,
-    found: State,
+    begun: FilterState,
+    found: FilterState,
     problem: FilterProblem,
     steps: Steps,
     held: Sequence[int],
     walked: Array | None = None,
-) -> State:
+) -> FilterState:
     """The state after a second pass through all steps; that ``found`` by the first where numbers are lost.
 
     ``begun`` is the state before the first step, and used up; other arguments as of
@@ -69,7 +69,7 @@ def second_pass(
     return again if sound else found
 
 
-class Kept(NamedTuple):
+class KeptRows(NamedTuple):
     """Rows that a stream keeps for further passes: of ``rows`` (m, 16) the first ``used``, the first angles and then
     steps of `inercal.systems.selfcal.filters.gaps.advance`: dt, rate, acc, th, 1 where held, walked, later, warm. None
     of a filter that needs no second pass, or once there are `LIMITS.kept_rows`."""
@@ -78,15 +78,15 @@ class Kept(NamedTuple):
     used: int = 0
 
     @staticmethod
-    def of(kind: FilterKind, problem: FilterProblem, th: Array) -> Kept:
+    def of(kind: FilterKind, problem: FilterProblem, th: Array) -> KeptRows:
         """The rows kept from a start with those angles (3,) [rad] on."""
         if not is_due(kind, problem):
-            return Kept()
+            return KeptRows()
         rows = np.zeros((64, 16))
         rows[0, 7:10] = th
-        return Kept(rows, 1)
+        return KeptRows(rows, 1)
 
-    def after(self, step: Steps, held: bool, walked: float) -> Kept:
+    def after(self, step: Steps, held: bool, walked: float) -> KeptRows:
         """The rows with one step more."""
         if not self.used:
             return self
@@ -94,14 +94,14 @@ class Kept(NamedTuple):
         rows[self.used] = np.hstack(
             [step.dt, step.rate[0], step.acc[0], step.th[0], held, walked, step.later[0], step.warm]
         )
-        return Kept(rows, self.used + 1)
+        return KeptRows(rows, self.used + 1)
 
     @property
     def full(self) -> bool:
         """True where another pass is due."""
         return 0 < len(self.rows) == self.used
 
-    def passed(self, problem: FilterProblem, found: State) -> tuple[State, Kept]:
+    def passed(self, problem: FilterProblem, found: FilterState) -> tuple[FilterState, KeptRows]:
         """The state after another pass through all rows kept, and the rows with room for as many more."""
         first, steps = self.rows[0, 7:10], self.rows[1:]
         held = np.flatnonzero(steps[:, 10]).tolist()
@@ -110,11 +110,15 @@ class Kept(NamedTuple):
         taken = Steps(dt, rate, acc, th, later, warm)
         begun = initial(error_state, problem, first, steps[0, 1:4])
         state = second_pass(begun, found, problem, taken, held, steps[:, 11])
-        more = Kept() if self.used >= LIMITS.kept_rows else Kept(np.vstack([self.rows] * 2), self.used)
+        more = (
+            KeptRows() if self.used >= LIMITS.kept_rows else KeptRows(np.vstack([self.rows] * 2), self.used)
+        )
         return state, more
 
 
-def _with_prior(state: State, taken_out: tuple[Array, Array], put_in: tuple[Array, Array]) -> State:
+def _with_prior(
+    state: FilterState, taken_out: tuple[Array, Array], put_in: tuple[Array, Array]
+) -> FilterState:
     """The state with one prior, mean and standard deviations (p,), in the place of another."""
     (about, narrow), (mean, prior) = taken_out, put_in
     P, p = state.covariance, len(prior)

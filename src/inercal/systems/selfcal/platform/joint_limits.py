@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from inercal.systems.selfcal.platform.plan import NO_LIMIT, Plan, Turn, of_joints
+from inercal.systems.selfcal.platform.plan import NO_LIMIT, PlatformPlan, Turn, of_joints
 from inercal.systems.selfcal.platform.rig import JOINTS
 
 Range = tuple[float, float]
@@ -19,7 +19,7 @@ _SLACK = 1e-9
 
 
 @dataclass(frozen=True)
-class Region:
+class ForbiddenAngles:
     """Angles that the joints may not have together: a range (low, high) [rad] of each, a whole turn more or less the
     same place; `ANY` where a joint does not matter."""
 
@@ -51,9 +51,9 @@ class JointLimits:
 
     rate: tuple[float, float, float] = NO_LIMIT
     acceleration: tuple[float, float, float] = NO_LIMIT
-    forbidden: tuple[Region, ...] = ()
+    forbidden: tuple[ForbiddenAngles, ...] = ()
 
-    def kept(self, plan: Plan) -> Plan:
+    def kept(self, plan: PlatformPlan) -> PlatformPlan:
         """The plan with turns that state no rate as slow as their joint, and with the accelerations of the joints."""
         moves = tuple(
             replace(move, rate=self.rate["xyz".index(move.joint)])
@@ -64,7 +64,7 @@ class JointLimits:
         return replace(plan, moves=moves, acceleration=self.acceleration)
 
 
-def beyond(plan: Plan, angles: Mapping[str, Range], limits: JointLimits) -> list[str]:
+def beyond(plan: PlatformPlan, angles: Mapping[str, Range], limits: JointLimits) -> list[str]:
     """Limits that a plan breaks: names of joints whose ``angles`` [rad] do, in words what else does."""
     fast = {
         f"rate of th_{move.joint}"
@@ -85,7 +85,7 @@ def beyond(plan: Plan, angles: Mapping[str, Range], limits: JointLimits) -> list
     return [*plan.beyond(angles), *sorted(fast), *steep, *regions]
 
 
-def spans(plan: Plan) -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+def spans(plan: PlatformPlan) -> Iterator[tuple[tuple[float, float, float], tuple[float, float, float]]]:
     """Lowest and highest angles (3,) [rad] of each move; those of the start alone where there is none."""
     at = plan.start
     for move in plan.moves:

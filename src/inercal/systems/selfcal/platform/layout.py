@@ -61,7 +61,7 @@ def entries(words: str, count: int) -> list[Entry]:
     return [Entry(port, "xyz".index(axis), QUANTITIES[port].index(name)) for axis, name in parts]
 
 
-class Layout(NamedTuple):
+class StateLayout(NamedTuple):
     """States as kernels take them, in few arrays: each costs seven words wherever a layout is handed over.
 
     ``chosen`` (p,) places of the states in the full vector; ``place`` (K,) of each parameter in the error state, -1
@@ -112,7 +112,7 @@ def layout_of(
     harmonics: Sequence[tuple[int, int]],
     fixed: Sequence[int],
     walks: int,
-) -> Layout:
+) -> StateLayout:
     """The layout of states at places ``index`` (p,) of the full vector.
 
     ``table`` (K,) says where each parameter enters, those from ``walks`` on walk; ``harmonics`` are joint and order of
@@ -159,7 +159,7 @@ def layout_of(
     begin = tuple(len(row) for row in rows)
     width = max(begin) + len(behind)
     late_encoders, late_accelerometers = (bool(active[slot]) for slot in slots["delay"])
-    return Layout(
+    return StateLayout(
         chosen=index, place=place, stated=np.array(stated, dtype=float),
         turning=np.isin(np.arange(3), fixed, invert=True),
         terms=_integers(terms, -1, 6), until=tuple(until), links=_integers(links, -1, 4),

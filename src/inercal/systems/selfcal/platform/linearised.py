@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from inercal.foundation._jit import allocating, kernel, merged
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, right_jacobian, rotate
-from inercal.foundation.inference.kalman import Row
+from inercal.foundation.inference.kalman import SlopeRow
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.kinematics import Axes, joint_axes, unit
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.model import (
     AXIS,
     PLACE,
@@ -57,7 +57,7 @@ class LinearisedRows(NamedTuple):
 
 @allocating
 def linearise_rows(
-    q: Array, th: Array, steps: Steps, c: Array, layout: Layout, world: World, out: LinearisedRows
+    q: Array, th: Array, steps: Steps, c: Array, layout: StateLayout, world: World, out: LinearisedRows
 ) -> None:
     """Linearise encoders which read ``th`` (m, 3) [rad], and accelerometers, at attitudes ``q`` (m, 4) after ``steps``;
     ``c`` is the full vector, linear form. ``by`` comes in as zeros."""
@@ -82,7 +82,7 @@ def linearise_rows(
 
 @allocating
 def linearise_steps(
-    q: Array, steps: Steps, c: Array, layout: Layout, world: World, turn: Array, slope: Array
+    q: Array, steps: Steps, c: Array, layout: StateLayout, world: World, turn: Array, slope: Array
 ) -> None:
     """Put rotation vectors ``turn`` (m, 3) [rad] of the platform against inertial space in each step from attitude
     ``q`` (m, 4), and the change ``slope`` (m, 3, p) of the attitude after it, about the axes of p."""
@@ -148,7 +148,7 @@ def transition(
 
 
 @merged
-def times(F: Transition, X: Array, layout: Layout, own: Room, top: Array, work: Array) -> None:
+def times(F: Transition, X: Array, layout: StateLayout, own: Room, top: Array, work: Array) -> None:
     """Put the first three rows of ``F X`` into ``top`` (3, m), ``X`` (n, m) a covariance, or sensitivities of attitude
     and states; quantities of the rate as `turning` left them in ``own``; ``work`` (3, m) is used up."""
     n, m, terms, w, dt = X.shape[0], X.shape[1], layout.terms, F.w, F.dt
@@ -175,7 +175,7 @@ def times(F: Transition, X: Array, layout: Layout, own: Room, top: Array, work: 
 
 
 @merged
-def add_unknown(F: Transition, n: int, layout: Layout, own: Room, top: Array) -> None:
+def add_unknown(F: Transition, n: int, layout: StateLayout, own: Room, top: Array) -> None:
     """Add to ``top`` (3, m), as of `times`, what errors outside the ``n`` of the error state, with the places behind
     them, do in a step."""
     terms = layout.terms
@@ -191,7 +191,7 @@ def add_unknown(F: Transition, n: int, layout: Layout, own: Room, top: Array) ->
 
 @merged
 def propagate_covariance(
-    P: Array, F: Transition, layout: Layout, own: Room, noise: float, top: Array, work: Array
+    P: Array, F: Transition, layout: StateLayout, own: Room, noise: float, top: Array, work: Array
 ) -> None:
     """Covariance ``P`` (n, n) of the error state after a step, in place; ``noise`` [rad^2] the variance of the attitude
     gained in it; quantities of the rate as `turning` left them in ``own``; ``top``, ``work`` (3, n) are used up."""
@@ -232,7 +232,7 @@ def wander(P: Array, c: Array, place: Places, of_gyros: float, of_accelerometers
 
 
 @kernel
-def encoder_row(i: int, columns: Places, axes: Array, row: Row) -> int:
+def encoder_row(i: int, columns: Places, axes: Array, row: SlopeRow) -> int:
     """Put the derivative of the attitude that encoders have about axis ``i`` of p, less that of the state, into a
     ``row``; returns the number of entries. ``columns`` (m,) are the places of the ``axes``."""
     row.places[0], row.values[0] = i, 1.0
@@ -242,7 +242,7 @@ def encoder_row(i: int, columns: Places, axes: Array, row: Row) -> int:
 
 
 @kernel
-def decorrelated_row(i: int, root: Vector, columns: Places, axes: Array, row: Row) -> int:
+def decorrelated_row(i: int, root: Vector, columns: Places, axes: Array, row: SlopeRow) -> int:
     """The same of the ``i``-th of their decorrelated scalars, of variance 1; ``root`` as of `encoder_roots`."""
     for j in range(i + 1):
         row.places[j], row.values[j] = j, root[j]

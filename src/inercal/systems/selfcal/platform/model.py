@@ -1,10 +1,11 @@
 """Compiled model of the platform, once: its rate, the attitude of its encoders, the outputs of its accelerometers, each
 with its columns by the states from the same numbers.
 
-Parameters ``c`` are the full vector (K,) of `inercal.systems.selfcal.platform.states`, in the linear form; a `Layout`
-says which of them are states. Attitudes are ``q_ep`` against the frame e of the encoders; earth rate and gravity in b
-turn with beta. With coefficients c and quantities v of a linear port (`inercal.systems.selfcal.platform.layout`), f the
-specific force in p, T how much warmer it is than the temperature of the coefficients,
+Parameters ``c`` are the full vector (K,) of `inercal.systems.selfcal.platform.states`, in the linear form; a
+`StateLayout` says which of them are states. Attitudes are ``q_ep`` against the frame e of the encoders; earth rate and
+gravity in b turn with beta. With coefficients c and quantities v of a linear port
+(`inercal.systems.selfcal.platform.layout`), f the specific force in p, T how much warmer it is than the temperature of
+the coefficients,
 
     rate     w' = w + M w + kg0 + sum c v(w, f, T)
     force    f' = f + sum c v(w'),   v the rows of [w']x [w']x           levers
@@ -35,7 +36,7 @@ from inercal.foundation._jit import allocating, kernel, merged
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector, exp, multiply, right_jacobian, rotate
 from inercal.systems.selfcal.platform.kinematics import Axes, elementary, joint_axes, unit
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.rig import World
 from inercal.systems.selfcal.platform.states import BETA, GAMMA, SAG, TAU
 
@@ -45,7 +46,7 @@ WIDEST = 80
 """Most entries of a row of the model, and most columns of states."""
 
 SLOT, PLACE, AXIS, QUANTITY, ORDER, ENTRY = range(6)
-"""Columns of `Layout.terms`."""
+"""Columns of `StateLayout.terms`."""
 
 STILL = (0.0, 0.0, 0.0)
 """No vector, for kernels."""
@@ -71,7 +72,7 @@ def room() -> Room:
     )
 
 
-class Base(NamedTuple):
+class EncoderWorld(NamedTuple):
     """The world in the frame of the encoders: ``earth`` rate (3,) [rad/s], and the specific force at rest ``up`` (3,)
     [m/s^2]."""
 
@@ -80,13 +81,13 @@ class Base(NamedTuple):
 
 
 @kernel
-def base_of(c: Array, based: bool, world: World) -> Base:
+def base_of(c: Array, based: bool, world: World) -> EncoderWorld:
     """The world, turned by beta where the base is."""
     earth, up = (world.earth[0], world.earth[1], world.earth[2]), (world.up[0], world.up[1], world.up[2])
     if not based:
-        return Base(earth, up)
+        return EncoderWorld(earth, up)
     turn = exp((c[BETA], c[BETA + 1], c[BETA + 2]))
-    return Base(rotate(turn, earth), rotate(turn, up))
+    return EncoderWorld(rotate(turn, earth), rotate(turn, up))
 
 
 @kernel
@@ -129,7 +130,7 @@ def rate_quantities(w: Vector, f: Vector, warm: float) -> tuple[float, ...]:
 
 
 @merged
-def turning(w: Vector, f: Vector, warm: float, c: Array, layout: Layout, own: Room) -> Vector:
+def turning(w: Vector, f: Vector, warm: float, c: Array, layout: StateLayout, own: Room) -> Vector:
     """Rate ``w_Ip^p`` (3,) [rad/s] of a platform that is commanded ``w`` (3,), at specific force ``f`` (3,) [m/s^2] and
     ``warm`` [K] above the temperature of the coefficients; quantities of its terms in ``own.of_rate``."""
     x = w[0] + c[0] + c[6] * w[1] - c[9] * w[2]
@@ -197,7 +198,7 @@ def about_turning(
 
 
 @merged
-def joint_angles(th: Vector | Array, c: Array, layout: Layout, own: Room) -> None:
+def joint_angles(th: Vector | Array, c: Array, layout: StateLayout, own: Room) -> None:
     """Put the angles of the joints whose encoders read ``th`` (3,) [rad] into ``own.small[1]``, and the quantities of
     their terms into ``own.quantities``."""
     angles, terms, first = own.small[1], layout.terms, layout.until[2]
@@ -210,7 +211,7 @@ def joint_angles(th: Vector | Array, c: Array, layout: Layout, own: Room) -> Non
 
 
 @merged
-def chain(c: Array, layout: Layout, world: World, own: Room) -> Quaternion:
+def chain(c: Array, layout: StateLayout, world: World, own: Room) -> Quaternion:
     """Inverse (4,) of the attitude of p in the chain of joints at angles ``own.small[1]``; columns of mount and links
     in ``own.axes``, axes of the joints in p in ``own.small[2:]``.
 
@@ -248,7 +249,13 @@ def bending(f: Vector, c: Array) -> Quaternion:
 
 @merged
 def encoders(
-    th: Vector | Array, read: Rates, base: Base, c: Array, layout: Layout, world: World, own: Room
+    th: Vector | Array,
+    read: Rates,
+    base: EncoderWorld,
+    c: Array,
+    layout: StateLayout,
+    world: World,
+    own: Room,
 ) -> Quaternion:
     """Attitude (4,) of p at a row as the encoders have it, which read ``th`` (3,) [rad] late by tau_enc; its columns,
     of the places ``layout.columns``, in ``own.axes``.
@@ -291,7 +298,7 @@ def encoders(
 
 @merged
 def accelerometers(
-    q: Quaternion, read: Rates, warm: float, base: Base, c: Array, layout: Layout, own: Room
+    q: Quaternion, read: Rates, warm: float, base: EncoderWorld, c: Array, layout: StateLayout, own: Room
 ) -> tuple[Vector, Vector]:
     """Outputs (3,) [m/s^2] at a row of attitude ``q`` of accelerometers late by tau_a, and the specific force (3,)
     [m/s^2] in p that they sense; their rows, of the places ``layout.rows``, in ``own.entries``."""
@@ -314,7 +321,14 @@ def output_quantities(s: Vector, by: Vector, warm: float) -> tuple[float, ...]:
 
 @merged
 def sensed(
-    q: Quaternion, rate: Vector, over: Vector, warm: float, base: Base, c: Array, layout: Layout, own: Room
+    q: Quaternion,
+    rate: Vector,
+    over: Vector,
+    warm: float,
+    base: EncoderWorld,
+    c: Array,
+    layout: StateLayout,
+    own: Room,
 ) -> tuple[Vector, Vector]:
     """`accelerometers` of a platform that has attitude ``q`` when they read, and turns then at ``rate`` (3,) [rad/s]
     against inertial space, ``over`` (3,) [rad/s] the base.

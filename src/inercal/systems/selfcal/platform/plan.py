@@ -47,7 +47,7 @@ def of_joints(values: Iterable[float]) -> tuple[float, float, float]:
 
 @short_repr
 @dataclass(frozen=True)
-class Plan:
+class PlatformPlan:
     """Moves one after the other from the angles ``start`` [rad], with rows every ``step`` [s].
 
     A move takes a whole number of rows: its rate is lowered where it does not come out even. A turn gains and loses its
@@ -140,7 +140,7 @@ class CommandedMotion:
     rate: Array
 
 
-def motion(plan: Plan, world: World) -> CommandedMotion:
+def motion(plan: PlatformPlan, world: World) -> CommandedMotion:
     """The commanded motion of a plan: ``w_c = J(th) th' + C_pb w_Ib^b`` at the middle of each step."""
     from inercal.systems.selfcal.platform.kinematics import (
         commanded_rates,  # here, so that reading a study loads no compiler
@@ -161,6 +161,6 @@ PATHS: Mapping[str, tuple[tuple[JointName, float], ...]] = {
 }
 
 
-def path(name: str, step: float = 0.2) -> Plan:
+def path(name: str, step: float = 0.2) -> PlatformPlan:
     """A named path at 1 deg/s; raises KeyError for an unknown name."""
-    return Plan(tuple(Turn(joint, math.radians(angle)) for joint, angle in PATHS[name]), step=step)
+    return PlatformPlan(tuple(Turn(joint, math.radians(angle)) for joint, angle in PATHS[name]), step=step)

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.terms import term
-from inercal.systems.selfcal.platform.layout import Entry, Layout, by_axis, entries, layout_of
+from inercal.systems.selfcal.platform.layout import Entry, StateLayout, by_axis, entries, layout_of
 
 
-class State(NamedTuple):
+class StateKind(NamedTuple):
     """States of one kind: their ``parameters``, ``dimension`` of a quantity, usual ``prior``, an ``example``, the
     meaning in ``words``, where it ``enters`` the model (`inercal.systems.selfcal.platform.layout.entries`), the ``key``
     of a study, and the ``source`` of the equation."""
@@ -57,91 +57,91 @@ _MARKOV = "A. Gelb (editor), Applied Optimal Estimation, MIT Press (1974), secti
 _WARM = "IEEE Std 952 and 1293: coefficients of temperature"
 _IEEE_1293 = "IEEE Std 1293: model equation of a linear accelerometer"
 
-STATES: Final[Mapping[str, State]] = {
-    "kg0": State(_by_axis("kg0"), "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases", "core"),
-    "eta": State(
+STATES: Final[Mapping[str, StateKind]] = {
+    "kg0": StateKind(_by_axis("kg0"), "rate", "0.3 deg/h", "0.08 deg/h", "gyro biases", "core"),
+    "eta": StateKind(
         ("eta_pz", "eta_oy", "eta_oz"), "angle", "300 arcsec", "60 arcsec",
         "misalignments eta of accelerometers, pz, oy, oz", "core",
     ),
-    "ds": State(_by_axis("ds"), "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros", "core"),
-    "do": State(_by_axis("do"), "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros", "core"),
-    "ka0": State(_by_axis("ka0"), "acceleration", "500 ug", "100 ug", "accelerometer biases", "core"),
-    "ka1": State(_by_axis("ka1"), "number", "1500 ppm", "500 ppm", "accelerometer scale errors", "core"),
-    "kg1": State(
+    "ds": StateKind(_by_axis("ds"), "angle", "300 arcsec", "60 arcsec", "misalignments ds of gyros", "core"),
+    "do": StateKind(_by_axis("do"), "angle", "300 arcsec", "60 arcsec", "misalignments do of gyros", "core"),
+    "ka0": StateKind(_by_axis("ka0"), "acceleration", "500 ug", "100 ug", "accelerometer biases", "core"),
+    "ka1": StateKind(_by_axis("ka1"), "number", "1500 ppm", "500 ppm", "accelerometer scale errors", "core"),
+    "kg1": StateKind(
         _by_axis("kg1"), "number", "100 ppm", "10 ppm", "gyro scale errors, in the extended model",
         by_axis("rate", "w_*"),
     ),
-    "beta": State(
+    "beta": StateKind(
         _by_axis("beta"), "angle", "60 arcsec", "5 arcsec",
         "the encoders' zero, in the extended model", "base",
     ),
-    "gamma": State(
+    "gamma": StateKind(
         _by_axis("gamma"), "angle", "20 arcsec", "0(20) arcsec",
         "turn of the sensors' axes p against the last gimbal, about the axes of p", "mount", "gamma", _CHAIN,
     ),
-    "non_orthogonality": State(
+    "non_orthogonality": StateKind(
         ("nonorth_xy", "nonorth_yz"), "angle", "20 arcsec", "0(20) arcsec",
         "inner axis against the outer, turned about the last at zero angles; last axis against the inner, turned "
         "about the outer", "link", "non_orthogonality", _CHAIN,
     ),
-    "zero_y": State(
+    "zero_y": StateKind(
         ("zero_y",), "angle", "20 arcsec", "0(20) arcsec",
         "reading of the inner encoder where the joint is at zero", "angle y 1", "zero_y", _CHAIN,
     ),
-    "delay": State(
+    "delay": StateKind(
         ("tau_enc", "tau_a"), "time", "5 ms", "0(5) ms",
         "time by which encoders, accelerometers are late against the rates, measured or commanded", "delay", "delay",
         _DELAY,
     ),
-    "k2": State(
+    "k2": StateKind(
         _by_axis("K2"), "quadratic", "20 ug/g^2", "0(20) ug/g^2",
         "second-order coefficients of accelerometers", by_axis("output", "s2_*"), "k2", _IEEE_1293,
     ),
-    "levers": State(
+    "levers": StateKind(
         tuple(f"r_{i}{j}" for i in "xyz" for j in "xyz"), "length", "50 mm", "0(50) mm",
         "place of accelerometer x, y, z in p from the centre of the gimbals, along x, y, z",
         "force " + ", ".join(f"{i} ww_{i}{j}" for i in "xyz" for j in "xyz"), "levers",
         "centripetal acceleration w x (w x r) of textbooks on mechanics",
     ),
-    "scale_asymmetry": State(
+    "scale_asymmetry": StateKind(
         _by_axis("S_asym"), "number", "10 ppm", "0(10) ppm",
         "gyro scale for positive rates less that for negative ones", by_axis("rate", "|w_*|/2"), "scale_asymmetry",
         "IEEE Std 952: scale-factor asymmetry",
     ),
-    "g_sensitivity": State(
+    "g_sensitivity": StateKind(
         tuple(f"G_{i}{j}" for i in "xyz" for j in "xyz"), "rate by force", "0.02 deg/h/g",
         "0(0.02) deg/h/g", "drift of gyro x, y, z per specific force along x, y, z",
         "rate " + ", ".join(f"{i} f_{j}" for i in "xyz" for j in "xyz"), "g_sensitivity",
         "IEEE Std 952: acceleration-sensitive drift",
     ),
-    "sag": State(
+    "sag": StateKind(
         _by_axis("sag"), "angle by force", "2 arcsec/g", "0(2) arcsec/g",
         "elastic turn of the sensors on the platform per specific force, by a mass off the centre along x, y, z",
         "bend", "sag", "Hooke's law",
     ),
-    "kg0_T1": State(
+    "kg0_T1": StateKind(
         tuple(f"kg0_{i}_T1" for i in "xyz"), "rate by temperature", "0.02 deg/h/K", "0(0.02) deg/h/K",
         "gyro biases per kelvin", by_axis("rate", "warm"), "kg0_T1", _WARM,
     ),
-    "ka0_T1": State(
+    "ka0_T1": StateKind(
         tuple(f"ka0_{i}_T1" for i in "xyz"), "acceleration by temperature", "50 ug/K", "0(50) ug/K",
         "accelerometer biases per kelvin", by_axis("output", "warm"), "ka0_T1", _WARM,
     ),
-    "ka1_T1": State(
+    "ka1_T1": StateKind(
         tuple(f"ka1_{i}_T1" for i in "xyz"), "number by temperature", "20 ppm/K", "0(20) ppm/K",
         "accelerometer scale errors per kelvin", by_axis("output", "warm_*"), "ka1_T1", _WARM,
     ),
-    "harmonics": State(
+    "harmonics": StateKind(
         tuple(f"harmonic_{k}_{part}" for k in range(1, 13) for part in ("sin", "cos")), "angle", "5 arcsec",
         "0(5) arcsec", "errors of the encoders that repeat with their angle, sine and cosine part of each, in the "
         "order of the study, or orders 1 and 2 of th_x, th_y, th_z", "waves", "harmonics",
         "eccentric and elliptic circles of textbooks on surveying instruments",
     ),
-    "gyro_walk": State(
+    "gyro_walk": StateKind(
         _by_axis("kg0_walk"), "rate", "0.0005 deg/h", "0.0005 deg/h",
         "gyro biases at the last row, less their means kg0", by_axis("rate", "1"), source=_MARKOV,
     ),
-    "accelerometer_walk": State(
+    "accelerometer_walk": StateKind(
         _by_axis("ka0_walk"), "acceleration", "1.9 ug", "1.9 ug",
         "accelerometer biases at the last row, less their means ka0", by_axis("output", "1"), source=_MARKOV,
     ),
@@ -218,7 +218,7 @@ class StateVector:
         return np.array([ALL.index(name) for name in self.names], dtype=np.int64)
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> StateLayout:
         """The same for kernels."""
         return layout_of(tuple(ENTRY_OF.values()), self.index, self.stated, self.harmonics, self.fixed, WALK)
 

@@ -8,9 +8,9 @@ from inercal.foundation._jit import allocating, kernel, merged
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Quaternion, Vector, multiply, normalize
 from inercal.systems.selfcal.platform.kinematics import joint_axes, nearest_turn
-from inercal.systems.selfcal.platform.layout import Layout
+from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.model import (
-    Base,
+    EncoderWorld,
     Rates,
     Room,
     accelerometers,
@@ -24,7 +24,7 @@ from inercal.systems.selfcal.platform.model import (
 from inercal.systems.selfcal.platform.rig import World
 
 
-class Truth(NamedTuple):
+class PlatformTruth(NamedTuple):
     """A true motion of n rows: attitudes ``q`` (n, 4), outputs ``acc`` (n, 3) [m/s^2] of accelerometers and readings
     ``th`` (n, 3) [rad] of encoders without noise."""
 
@@ -41,9 +41,9 @@ def simulate_truth(
     noise: Array,
     warm: Array,
     c: Array,
-    layout: Layout,
+    layout: StateLayout,
     world: World,
-    out: Truth,
+    out: PlatformTruth,
 ) -> None:
     """True attitudes and readings, integrated at finer steps of ``dt`` [s], m between rows.
 
@@ -85,7 +85,14 @@ def simulate_truth(
 
 @merged
 def _angles_read(
-    q: Quaternion, near: Vector, read: Rates, base: Base, c: Array, layout: Layout, world: World, own: Room
+    q: Quaternion,
+    near: Vector,
+    read: Rates,
+    base: EncoderWorld,
+    c: Array,
+    layout: StateLayout,
+    world: World,
+    own: Room,
 ) -> Vector:
     """Angles (3,) [rad] that encoders read at attitude ``q``, by Newton's method from ``near`` (3,)."""
     th = near

@@ -14,7 +14,7 @@ from inercal.foundation.results.shown import Table, heads, rounded, short
 from inercal.systems.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.platform.coefficients import shown_units
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.result.comparison import attitude_errors, with_stated
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def weak_combinations(bounds: PathBounds) -> Table:
     )
 
 
-def turns(plan: Plan) -> Table:
+def turns(plan: PlatformPlan) -> Table:
     """The moves of a plan, with the angles and the time at which each ends."""
     at, clock, rows = np.array(plan.start), 0.0, []
     for number, move in enumerate(plan.moves, start=1):

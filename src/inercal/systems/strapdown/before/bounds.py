@@ -29,10 +29,10 @@ from inercal.systems.strapdown.fit.batch import (
 from inercal.systems.strapdown.fit.start import start_u
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import SIZE, free_places, names, slope, stated
-from inercal.systems.strapdown.model.kernels import Motion, State, increments, shoot
+from inercal.systems.strapdown.model.kernels import BodyMotion, NodeState, increments, shoot
 from inercal.systems.strapdown.model.samples import PAIRS, gains
-from inercal.systems.strapdown.settings import Plan, StrapdownSettings
-from inercal.systems.strapdown.simulate import AXES, Turn, start_attitude, truth
+from inercal.systems.strapdown.settings import StrapdownSettings, TurnPlan
+from inercal.systems.strapdown.simulate import AXES, UnitTurn, start_attitude, truth
 
 
 class Times(NamedTuple):
@@ -141,7 +141,7 @@ class Pieces:
         if key not in self._kept:
             margin, time = self.settings.rests.margin, turn_time * abs(angle) / (0.5 * np.pi)
             count = int(np.ceil(2.0 * abs(angle) / LIMITS.block_angle))
-            turn = Turn(margin, time, C, axis, angle, np.zeros(3))
+            turn = UnitTurn(margin, time, C, axis, angle, np.zeros(3))
             self._kept[key] = self._interval(turn, time + 2.0 * margin, max(count, 10), True)
         return self._kept[key]
 
@@ -152,7 +152,7 @@ class Pieces:
             rests, m = self.settings.rests, self.m
             time = max(dwell - 2.0 * rests.margin, LIMITS.shortest_rest)
             pieces = max(1, int(np.ceil(time / rests.node - 1e-6)))
-            turn = Turn(2.0 * time, 1.0, C, 0, 0.0, np.zeros(3))
+            turn = UnitTurn(2.0 * time, 1.0, C, 0, 0.0, np.zeros(3))
             one = self._interval(turn, time / pieces, LIMITS.block_samples)
             # errors at both ends, three angles of the reference, coefficients
             wide = np.zeros((len(one) + 3, len(one) + 3))
@@ -171,7 +171,7 @@ class Pieces:
             )
         return self._kept[key]
 
-    def _interval(self, turn: Turn, time: float, count: int, turns: bool = False) -> Array:
+    def _interval(self, turn: UnitTurn, time: float, count: int, turns: bool = False) -> Array:
         """Information (2 m + p, 2 m + p) of an interval of ``time`` [s] in ``count`` steps, one that ``turns`` or
         not."""
         settings, m, c = self.settings, self.m, np.zeros(SIZE)
@@ -179,9 +179,9 @@ class Pieces:
         world = world_of(settings, c, ts)
         at: Array = ts * (np.arange(count, dtype=float) + 0.5)
         moved = truth(turn, at, settings.motion, world.earth, world.gravity)
-        motion = Motion(moved.w, moved.wd, moved.f, moved.f, np.empty((count, 3)), np.empty((count, 3)))
+        motion = BodyMotion(moved.w, moved.wd, moved.f, moved.f, np.empty((count, 3)), np.empty((count, 3)))
         increments(motion.w, motion.f, PAIRS, ts, motion.turn, motion.gain)
-        state = State(from_matrix(turn.C_nb[None]), np.zeros((1, 3)), np.zeros((1, 6)))
+        state = NodeState(from_matrix(turn.C_nb[None]), np.zeros((1, 3)), np.zeros((1, 6)))
         shot = empty_shot(1, m)
         cuts, first = np.arange(count + 1), np.array([0, count])
         variances = variances_of(settings.noise)
@@ -237,12 +237,12 @@ def _repeated(piece: Array, number: int, m: int) -> Array:
     return joined(twice, piece, m) if number % 2 else twice
 
 
-def _times_of(plan: Plan) -> Times:
+def _times_of(plan: TurnPlan) -> Times:
     """Times of a plan."""
     return Times(plan.turn_time, plan.dwell, plan.first_dwell)
 
 
-def bounds(pieces: Pieces, plan: Plan) -> PlanBounds:
+def bounds(pieces: Pieces, plan: TurnPlan) -> PlanBounds:
     """Bounds along a plan, and after each of its rests."""
     settings = pieces.settings
     steps = pieces.steps(start_attitude(plan), plan.turns, _times_of(plan))

@@ -23,7 +23,7 @@ from inercal.systems.strapdown.before.bounds import Pieces, PlanBounds, bounds
 from inercal.systems.strapdown.before.path_search import Path, TurnGround, attitudes, search
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import ALWAYS, group_of
-from inercal.systems.strapdown.settings import Plan, StrapdownSettings
+from inercal.systems.strapdown.settings import StrapdownSettings, TurnPlan
 from inercal.systems.strapdown.simulate import AXES, start_attitude
 
 REFERENCES: Final = (
@@ -72,7 +72,7 @@ class ComparedPlan:
     """A plan, its bounds, and the ``ratio`` (q,) of their u to the goal."""
 
     name: str
-    plan: Plan
+    plan: TurnPlan
     bounds: PlanBounds
     ratio: Array
 
@@ -127,13 +127,13 @@ def design(
     ``progress`` is told (done, total) of the random starts. Raises `StudyError` without turns and without a search, and
     where the time is too short for the turns.
     """
-    asked, given = settings.design, settings.plan or Plan()
+    asked, given = settings.design, settings.plan or TurnPlan()
     if asked is None and not given.turns:
         raise StudyError("plan.turns", "missing, expected turns, or a table [design] to search for them")
     pieces = Pieces(settings)
     of_nineteen = replace(given, turns=NINETEEN, start=_NINETEEN_START)
     goal = _goal(settings, _sound(bounds(pieces, of_nineteen)))
-    plans, tried = dict[str, Plan](), 0
+    plans, tried = dict[str, TurnPlan](), 0
     if asked is not None:
         ground = _ground_of(pieces, given, goal)
         path, tried = search(ground, np.random.default_rng(asked.seed), progress)
@@ -167,7 +167,7 @@ def _sound(along: PlanBounds) -> PlanBounds:
     return along
 
 
-def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> TurnGround:
+def _ground_of(pieces: Pieces, given: TurnPlan, goal: Array) -> TurnGround:
     """The ground of a study's search; ``goal`` (q,). Raises `StudyError` where the turns leave no time for rests."""
     asked = pieces.settings.design
     assert asked is not None
@@ -187,7 +187,7 @@ def _ground_of(pieces: Pieces, given: Plan, goal: Array) -> TurnGround:
     return ground
 
 
-def _plan_of(ground: TurnGround, path: Path, given: Plan) -> Plan:
+def _plan_of(ground: TurnGround, path: Path, given: TurnPlan) -> TurnPlan:
     """A path as a plan."""
     start, turns = path
     return replace(given, turns=turns, start=angles_of(ground.starts[start]), dwell=ground.times(turns).dwell)
@@ -203,14 +203,14 @@ def angles_of(C_nb: Array) -> tuple[float, float, float]:
     return pitch, math.atan2(-C_nb[2, 0], C_nb[2, 2]), yaw
 
 
-def stated_turns(plan: Plan) -> list[list[str]]:
+def stated_turns(plan: TurnPlan) -> list[list[str]]:
     """Turns as a study states them."""
     return [[AXES[axis], f"{math.degrees(angle):.10g} deg"] for axis, angle in plan.turns]
 
 
 def nineteen() -> list[list[str]]:
     """Turns of the path of 19 positions, as a study states them."""
-    return stated_turns(Plan(NINETEEN))
+    return stated_turns(TurnPlan(NINETEEN))
 
 
 def _shortest(settings: StrapdownSettings) -> float:
@@ -218,7 +218,7 @@ def _shortest(settings: StrapdownSettings) -> float:
     return LIMITS.shortest_rest + 2.0 * settings.rests.margin
 
 
-def _lasting(plan: Plan, time: float) -> Plan:
+def _lasting(plan: TurnPlan, time: float) -> TurnPlan:
     """The plan with rests that make it last ``time`` [s]."""
     return replace(plan, dwell=plan.dwell + (time - plan.duration) / len(plan.turns))
 
@@ -286,7 +286,7 @@ def _entry(judged: ComparedPlan) -> dict[str, Any]:
     }
 
 
-def _turns(plan: Plan, along: PlanBounds) -> Table:
+def _turns(plan: TurnPlan, along: PlanBounds) -> Table:
     """The turns, and what each tells."""
     rows = []
     C = start_attitude(plan)

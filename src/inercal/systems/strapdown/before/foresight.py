@@ -13,7 +13,7 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.rotations import elementary
 from inercal.systems.strapdown.before.bounds import Pieces, bounds
 from inercal.systems.strapdown.before.design import unit_of
-from inercal.systems.strapdown.settings import Plan, StrapdownSettings
+from inercal.systems.strapdown.settings import StrapdownSettings, TurnPlan
 from inercal.systems.strapdown.simulate import AXES, start_attitude
 
 _OF_NOISE = {
@@ -56,7 +56,7 @@ def verticals(settings: StrapdownSettings) -> Array:
     return np.stack(attitudes)[:, 2]
 
 
-def _plan(settings: StrapdownSettings) -> Plan:
+def _plan(settings: StrapdownSettings) -> TurnPlan:
     """The plan; raises `StudyError` without turns."""
     if settings.plan is None or not settings.plan.turns:
         raise StudyError("plan.turns", 'missing, expected turns such as [["y", "90 deg"]]')

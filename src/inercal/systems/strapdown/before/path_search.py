@@ -20,7 +20,7 @@ from inercal.foundation.designs.search import from_starts, improved
 from inercal.foundation.geometry.rotations import elementary
 from inercal.systems.strapdown.before.bounds import Pieces, Step, Times
 from inercal.systems.strapdown.limits import LIMITS
-from inercal.systems.strapdown.settings import Plan
+from inercal.systems.strapdown.settings import TurnPlan
 from inercal.systems.strapdown.simulate import start_attitude
 
 Turns: TypeAlias = tuple[tuple[int, float], ...]
@@ -115,7 +115,7 @@ def search(
     return min(found, key=lambda each: each[0])[1], len(values)
 
 
-def attitudes(plan: Plan) -> tuple[Array, ...]:
+def attitudes(plan: TurnPlan) -> tuple[Array, ...]:
     """The 24 first attitudes (3, 3) that quarter turns make of that of a plan, that first."""
     found = [start_attitude(plan)]
     for C in found:

@@ -16,7 +16,7 @@ from inercal.foundation._jit import inlined, kernel
 from inercal.foundation.arrays import Array
 
 
-class Chain(NamedTuple):
+class NodeChain(NamedTuple):
     """The rows of a chain, linearised: x_k+1 - F x_k - G c = e + noise of information W, and at the nodes.
 
     ``F`` (k, m, m), ``G`` (k, m, p), ``e`` (k, m), ``W`` (k, m, m) of intervals; ``rest`` (k + 1,) number of the rest
@@ -126,7 +126,7 @@ def _moved_on(H: Array, g: Array, m: int, ends: bool) -> None:
 
 @inlined
 def begun(start: Array, begin: Array, prior: Array, c: Array, H: Array, g: Array) -> None:
-    """Set H and g to what is known beforehand of the first node and of the coefficients, as in `Chain`."""
+    """Set H and g to what is known beforehand of the first node and of the coefficients, as in `NodeChain`."""
     n, p = len(g), len(c)
     for i in range(n):
         g[i] = 0.0
@@ -148,7 +148,7 @@ def kept(H: Array, g: Array, rows: Array, right: Array) -> None:
             rows[i, j] = H[i, j]
 
 
-def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None:
+def forward(chain: NodeChain, H: Array, g: Array, rows: Array, right: Array) -> None:
     """Eliminate all nodes: ``H`` (n, n) and ``g`` (n,), n = 2 m + 3 + p, end with the coefficients alone; ``rows``
     (k + 1, m + 3, n) and ``right`` (k + 1, m + 3) keep what `backward` needs. Of H the upper triangle counts.
 
@@ -163,7 +163,7 @@ def forward(chain: Chain, H: Array, g: Array, rows: Array, right: Array) -> None
 
 @kernel
 def _eliminate_all(
-    chain: Chain, H: Array, g: Array, rows: Array, right: Array, gone: Array, row: Array, weighted: Array
+    chain: NodeChain, H: Array, g: Array, rows: Array, right: Array, gone: Array, row: Array, weighted: Array
 ) -> None:
     """Eliminate all nodes as in `forward`; ``gone`` (n,), ``row`` and ``weighted`` (m, n) are used up."""
     m, n, count = chain.F.shape[1], len(g), len(chain.rest)
@@ -255,7 +255,7 @@ def explained(F: Array, G: Array, Z: Array, row: Array, out: Array, coupled: Arr
             coupled[b, i] = row[2 * m + 3 + i]
 
 
-def followed(chain: Chain, rows: Array, Z: Array, out: Array, coupled: Array, nodes: Array) -> None:
+def followed(chain: NodeChain, rows: Array, Z: Array, out: Array, coupled: Array, nodes: Array) -> None:
     """Covariance ``out`` (k, m, m) of what the solution says of each interval, and with the coefficients that of each
     interval ``coupled`` (k, m, p) and of each node and the reference of its rest ``nodes`` (k + 1, m + 3, p); ``Z``
     (n, n) begins with the covariance (p, p) of the coefficients at its end and zeros before."""

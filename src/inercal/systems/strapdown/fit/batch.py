@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import conjugate, exp, log, multiply, skew
-from inercal.systems.strapdown.fit.arrow import Chain, backward, followed, forward
+from inercal.systems.strapdown.fit.arrow import NodeChain, backward, followed, forward
 from inercal.systems.strapdown.fit.rests import Nodes
 from inercal.systems.strapdown.fit.start import beginning, carried_through, first_coefficients
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import GRAVITY, LATITUDE, SIZE, free_places
-from inercal.systems.strapdown.model.kernels import Shot, State, World, shoot
+from inercal.systems.strapdown.model.kernels import NodeState, Shot, UnitWorld, shoot
 from inercal.systems.strapdown.model.samples import Samples, freed, gains
 from inercal.systems.strapdown.settings import Noise, StrapdownSettings
 
@@ -59,16 +59,16 @@ class Fit:
     redundancy: Array
     passes: int
     converged: bool
-    chain: Chain
+    chain: NodeChain
     sensitivities: Array
     said: Followed
 
 
-def world_of(settings: StrapdownSettings, c: Array, ts: float) -> World:
+def world_of(settings: StrapdownSettings, c: Array, ts: float) -> UnitWorld:
     """Earth rate and gravity at the site, as corrected by ``c`` (51,)."""
     latitude = settings.latitude + c[LATITUDE]
     earth = EARTH_RATE * np.array([0.0, np.cos(latitude), np.sin(latitude)])
-    return World(earth, settings.site.gravity + float(c[GRAVITY]), ts)
+    return UnitWorld(earth, settings.site.gravity + float(c[GRAVITY]), ts)
 
 
 def variances_of(noise: Noise) -> Array:
@@ -134,14 +134,14 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begun: 
     passes, converged, before = 0, False, None
     while True:
         world, by = world_of(settings, c, samples.ts), gains(c)
-        shoot(motion, nodes.cuts, nodes.first, State(q, v, bias), by, world, variances, shot)
+        shoot(motion, nodes.cuts, nodes.first, NodeState(q, v, bias), by, world, variances, shot)
         add_turns(shot.Q, nodes.turns, variances)
         apart = log(multiply(shot.q, conjugate(q[1:]))), shot.v - v[1:], bias[:-1] - bias[1:]
         e = np.ascontiguousarray(np.hstack(apart)[:, :m])
         # the force through an interval is known by the velocities at its ends: its noise would tell of the heading
         expected = 5.0 * np.sqrt(np.einsum("kii->k", shot.Q[:, 3:6, 3:6]))
         shot.F[:, 3:6, :3] += skew(apart[1] * (np.linalg.norm(apart[1], axis=1) < expected)[:, None])
-        chain = Chain(
+        chain = NodeChain(
             shot.F,
             _wide(shot.G[:, :, free], m),
             e,
@@ -200,7 +200,7 @@ def _fitted(samples: Samples, nodes: Nodes, settings: StrapdownSettings, begun: 
     )
 
 
-def followed_by(chain: Chain, rows: Array, covariance: Array) -> Followed:
+def followed_by(chain: NodeChain, rows: Array, covariance: Array) -> Followed:
     """Content of the solution of a chain, with the ``rows`` of its elimination and the ``covariance`` (p, p) of the
     coefficients."""
     n, p, m, count = rows.shape[2], len(covariance), chain.F.shape[1], len(chain.rest)
@@ -242,7 +242,7 @@ def interval_covariance(fit: Fit, samples: Samples, settings: StrapdownSettings,
     """Covariance (k, m, m) of what sensor noise, walks and turns of ``variances`` (6,) gain over the intervals of a
     fit: it is linear in these."""
     m, count = fit.chain.F.shape[1], len(fit.nodes.sample)
-    shot, state = empty_shot(count - 1, m), State(fit.q_nb, fit.velocity, np.zeros((count, 6)))
+    shot, state = empty_shot(count - 1, m), NodeState(fit.q_nb, fit.velocity, np.zeros((count, 6)))
     world = world_of(settings, fit.c, samples.ts)
     shoot(freed(samples, fit.c), fit.nodes.cuts, fit.nodes.first, state, gains(fit.c), world, variances, shot)
     add_turns(shot.Q, fit.nodes.turns, variances)
@@ -262,12 +262,12 @@ def inverse(information: Array, prior: Array) -> Array:
     return np.asarray(root.T @ root * np.outer(prior, prior))
 
 
-def left_over(chain: Chain, step: Array, x: Array) -> Array:
+def left_over(chain: NodeChain, step: Array, x: Array) -> Array:
     """Residuals (k, m) of the intervals at a solution."""
     return np.asarray(chain.e + np.einsum("kij,kj->ki", chain.F, x[:-1]) + chain.G @ step - x[1:])
 
 
-def _chi2(chain: Chain, step: Array, x: Array, angles: Array) -> tuple[float, Array]:
+def _chi2(chain: NodeChain, step: Array, x: Array, angles: Array) -> tuple[float, Array]:
     """Sum of squares of the data at the solution, and its parts (k,) by interval."""
     left = left_over(chain, step, x)
     squares = np.einsum("ki,kij,kj->k", left, chain.W, left)

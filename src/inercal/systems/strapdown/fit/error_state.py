@@ -25,7 +25,7 @@ from inercal.systems.strapdown.fit.rests import Nodes
 from inercal.systems.strapdown.fit.start import beginning, first_coefficients
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import free_places
-from inercal.systems.strapdown.model.kernels import State, shoot
+from inercal.systems.strapdown.model.kernels import NodeState, shoot
 from inercal.systems.strapdown.model.samples import Samples, freed, gains
 from inercal.systems.strapdown.settings import StrapdownSettings
 
@@ -100,7 +100,7 @@ def measured(s: Array, P: Array, i: int, j: int, z: float, variance: float, colu
     return float(off * off / spread)
 
 
-class Path(NamedTuple):
+class NodePath(NamedTuple):
     """A solution at the nodes: attitude ``q`` (k, 4) C_nb and velocity ``v`` (k, 3)."""
 
     q: Array
@@ -147,7 +147,7 @@ class _Run:
     def on(self, k: int, q: Array, v: Array, bias: Array) -> tuple[Array, Array]:
         """Carry solution and errors from node k to the next."""
         first = self.nodes.first[k : k + 2]
-        state, shot = State(q[None], v[None], bias[None]), self.shot
+        state, shot = NodeState(q[None], v[None], bias[None]), self.shot
         shoot(self.motion, self.nodes.cuts, first, state, self.by, self.world, self.variances, shot)
         if self.nodes.rest[k + 1] != self.nodes.rest[k]:
             add_turns(shot.Q, np.zeros(1, dtype=np.int64), self.variances)
@@ -175,7 +175,7 @@ class _Run:
         for i in range(3):
             self.nis += measured(self.s, self.P, i, m + i, -float(angles[i]), rests.attitude**2, column)
 
-    def through(self, q: Array, feed: bool, path: Path | None = None) -> tuple[Array, Array]:
+    def through(self, q: Array, feed: bool, path: NodePath | None = None) -> tuple[Array, Array]:
         """Run from the attitude ``q`` (4,) of the first node to the last; ``feed`` takes errors out of the solution at
         each node, which otherwise goes on by itself or along a ``path``. Covariance (rests, p, p) of the coefficients
         and mean NIS (rests,) after each rest."""
@@ -213,13 +213,13 @@ class _Run:
         gain = np.linalg.solve(scaled, self.P[constant, :6] / size[:, None]).T / size
         self.kept.append(Node(q, v, self.s[:6] - gain @ self.s[constant], gain))
 
-    def path(self) -> Path:
+    def path(self) -> NodePath:
         """The solution at the nodes with its errors taken out, as the start and the coefficients at the end have them:
         along it the next pass is linear."""
         constant = self.s[self.m + 3 :]
         errors = np.array([each.error + each.gain @ constant for each in self.kept])
         q, v = np.array([each.q for each in self.kept]), np.array([each.v for each in self.kept])
-        return Path(normalize(multiply(exp(errors[:, :3]), q)), v + errors[:, 3:])
+        return NodePath(normalize(multiply(exp(errors[:, :3]), q)), v + errors[:, 3:])
 
 
 def filtered(
@@ -238,7 +238,7 @@ def _passes(samples: Samples, nodes: Nodes, settings: StrapdownSettings, before:
     prior, c = settings.deviations()[free], first_coefficients(samples, nodes)
     at = beginning(freed(samples, c), nodes, settings)
 
-    def ran(q: Array, feed: bool, path: Path | None = None) -> tuple[_Run, Array, Array]:
+    def ran(q: Array, feed: bool, path: NodePath | None = None) -> tuple[_Run, Array, Array]:
         run = _Run(samples, nodes, settings, c, free)
         off, u = log(multiply(at.q_nb, conjugate(q))), at.u
         if feed:  # a closed pass is of a start that is nearly known

@@ -14,7 +14,7 @@ from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.strapdown.fit.rests import Nodes
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import SIZE, D
-from inercal.systems.strapdown.model.kernels import Motion, turned
+from inercal.systems.strapdown.model.kernels import BodyMotion, turned
 from inercal.systems.strapdown.model.samples import Samples
 from inercal.systems.strapdown.settings import StrapdownSettings
 
@@ -26,7 +26,7 @@ class Beginning(NamedTuple):
     u: Array
 
 
-def beginning(motion: Motion, nodes: Nodes, settings: StrapdownSettings) -> Beginning:
+def beginning(motion: BodyMotion, nodes: Nodes, settings: StrapdownSettings) -> Beginning:
     """Attitude of the first rest: level by gravity; its heading as stated, by earth rate where the gyros are good
     enough for that or the study says so, else 0."""
     last = nodes.sample[np.flatnonzero(nodes.rest == 0)[-1]]
@@ -73,7 +73,7 @@ def first_coefficients(samples: Samples, nodes: Nodes) -> Array:
     return c
 
 
-def carried_through(motion: Motion, nodes: Nodes, begin: Beginning) -> Array:
+def carried_through(motion: BodyMotion, nodes: Nodes, begin: Beginning) -> Array:
     """Attitudes (k + 1, 4) at all nodes, by the gyros alone, set level by the mean force of each rest."""
     q, by = begin.q_nb, np.empty((len(nodes.sample) - 1, 4))
     turned(motion.turn, nodes.sample, by)

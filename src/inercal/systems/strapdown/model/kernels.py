@@ -43,7 +43,7 @@ class Gains(NamedTuple):
     r: Array
 
 
-class Motion(NamedTuple):
+class BodyMotion(NamedTuple):
     """Samples (n, 3) freed of the errors: rate ``w`` [rad/s] and its derivative ``wd``, force ``fs`` at the
     accelerometers and ``f`` at the origin [m/s^2], ``turn`` [rad] and ``gain`` of velocity [m/s] over each sample, in
     b at its beginning."""
@@ -56,7 +56,7 @@ class Motion(NamedTuple):
     gain: Array
 
 
-class World(NamedTuple):
+class UnitWorld(NamedTuple):
     """Earth rate ``earth`` (3,) [rad/s] in n, ``gravity`` [m/s^2], the sample interval ``ts`` [s]."""
 
     earth: Array
@@ -147,7 +147,9 @@ def without(x: Array, bias: Vector, ts: float) -> Vector:
 
 
 @kernel
-def carried(q: Quaternion, v: Vector, turn: Vector, gain: Vector, world: World) -> tuple[Quaternion, Vector]:
+def carried(
+    q: Quaternion, v: Vector, turn: Vector, gain: Vector, world: UnitWorld
+) -> tuple[Quaternion, Vector]:
     """Attitude and velocity after a sample."""
     ts = world.ts
     e = (world.earth[0] * ts, world.earth[1] * ts, world.earth[2] * ts)
@@ -168,7 +170,7 @@ def turned(turn: Array, sample: Whole, q: Array) -> None:
 
 
 @inlined
-def _add_sample(motion: Motion, k: int, ts: float, sums: Array) -> None:
+def _add_sample(motion: BodyMotion, k: int, ts: float, sums: Array) -> None:
     """Add a sample to the sums of a block."""
     w, fs = motion.w[k], motion.fs[k]
     f = (motion.f[k, 0], motion.f[k, 1], motion.f[k, 2])
@@ -283,7 +285,7 @@ def spread(F: Array, Q: Array, out: Array) -> None:
                 Q[i, j], Q[j, i] = Q[j, i], Q[i, j]
 
 
-class State(NamedTuple):
+class NodeState(NamedTuple):
     """A solution at the nodes: attitude ``q`` (k, 4) C_nb, velocity ``v`` (k, 3), and ``bias`` (k, 6), the deviation of
     the biases of gyros and accelerometers [output] from those of the coefficients."""
 
@@ -304,7 +306,7 @@ class Shot(NamedTuple):
     Q: Array
 
 
-class Room(NamedTuple):
+class WorkRoom(NamedTuple):
     """Room to work in: the attitude ``C`` of a block, its transition ``F`` (m, m), 1 at first, its sources ``S`` (6,
     51), 0 at first, its ``sums`` (27,), and what products need, ``square`` (6, m) and ``wide`` (6, 51)."""
 
@@ -317,7 +319,14 @@ class Room(NamedTuple):
 
 
 def shoot(
-    motion: Motion, cuts: Whole, first: Whole, state: State, c: Gains, world: World, noise: Array, shot: Shot
+    motion: BodyMotion,
+    cuts: Whole,
+    first: Whole,
+    state: NodeState,
+    c: Gains,
+    world: UnitWorld,
+    noise: Array,
+    shot: Shot,
 ) -> None:
     """Carry the solution from the ``state`` at each node to the next.
 
@@ -326,7 +335,7 @@ def shoot(
     m, bias = shot.F.shape[1], state.bias
     shot.F[:], shot.G[:], shot.Q[:] = np.eye(m), 0.0, 0.0
     off = np.hstack([applied(c.gyro, bias[:, :3]), applied(c.accelerometer, bias[:, 3:])])
-    room = Room(
+    room = WorkRoom(
         np.empty((3, 3)),
         np.eye(m),
         np.zeros((6, SIZE)),
@@ -339,8 +348,8 @@ def shoot(
 
 @kernel
 def _shots(
-    motion: Motion, cuts: Whole, first: Whole, state: State, of_gyros: Array, of_accs: Array, world: World,
-    noise: Array, shot: Shot, room: Room,
+    motion: BodyMotion, cuts: Whole, first: Whole, state: NodeState, of_gyros: Array, of_accs: Array, world: UnitWorld,
+    noise: Array, shot: Shot, room: WorkRoom,
 ) -> None:  # fmt: skip
     """Carry the solution on, with inverse gains (3, 3) of both triads; biases are as they act on rate and force."""
     C, F, S, sums = room.C, room.F, room.S, room.sums

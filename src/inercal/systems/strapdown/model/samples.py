@@ -14,7 +14,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.systems.strapdown.model.coefficients import K0, K2, KA, KG, TAU, A, D, G, R
-from inercal.systems.strapdown.model.kernels import Gains, Motion, applied, increments, mean_lever
+from inercal.systems.strapdown.model.kernels import BodyMotion, Gains, applied, increments, mean_lever
 
 
 def delayed(x: Array, samples: float) -> Array:
@@ -85,7 +85,7 @@ def gains(c: Array) -> Gains:
     )
 
 
-def freed(samples: Samples, c: Array) -> Motion:
+def freed(samples: Samples, c: Array) -> BodyMotion:
     """Motion of b at the times of which the accelerometers tell: stamps less the delay."""
     ts, by = samples.ts, gains(c)
     rate = samples.rate if c[TAU] == 0.0 else delayed(samples.rate, c[TAU] / ts)
@@ -99,7 +99,7 @@ def freed(samples: Samples, c: Array) -> Motion:
         f = _at_origin(w, wd, fs, by, ts)
     turn, gain = np.empty_like(w), np.empty_like(w)
     increments(w, f, PAIRS, ts, turn, gain)
-    return Motion(w, wd, fs, f, turn, gain)
+    return BodyMotion(w, wd, fs, f, turn, gain)
 
 
 def _true_force(y: Array, c: Gains) -> Array:

@@ -55,7 +55,7 @@ def _usual_size(settings: StrapdownSettings) -> float:
 
 
 def considered(
-    tested: list[Tested], settings: StrapdownSettings, slope: Array, found: tuple[str, ...], u: Array
+    tested: list[TestedEffect], settings: StrapdownSettings, slope: Array, found: tuple[str, ...], u: Array
 ) -> Considered | None:
     """Drifts by specific force among the effects outside the model; None where the study fits them.
 
@@ -122,7 +122,7 @@ class Candidate(NamedTuple):
     prior: Array
 
 
-class Tested(NamedTuple):
+class TestedEffect(NamedTuple):
     """A candidate, by how much chi-square falls when it is freed, and the ``limit`` beyond which that is more than
     chance; by how much each of its parameters, one prior standard deviation large, has ``moved`` (p, q) the
     coefficients of the fit; in the same units the ``score`` (q,) of the parameters and their ``information`` (q, q),
@@ -208,7 +208,7 @@ class Posed(NamedTuple):
     g: Array
     prior: Array
 
-    def tested(self, candidate: Candidate, *numbers: int, beside: int | None = None) -> Tested | None:
+    def tested(self, candidate: Candidate, *numbers: int, beside: int | None = None) -> TestedEffect | None:
         """The score test of a candidate whose parameters are those of these ``numbers``, with those of another one
         freed before it where ``beside`` is given; None where the information was lost in rounding."""
         from scipy.special import chdtri
@@ -223,7 +223,7 @@ class Posed(NamedTuple):
         drop = float(score @ np.linalg.solve(information, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(self.candidates)))
         moved = -self.prior[:, None] * by[:p]
-        return Tested(candidate, drop, limit, moved, score, information)
+        return TestedEffect(candidate, drop, limit, moved, score, information)
 
 
 def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
@@ -252,14 +252,14 @@ def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
     return Posed(tried, places, scaled, g[2 * m + 3 :] * size, fit.prior)
 
 
-def tests(problem: Posed) -> list[Tested]:
+def tests(problem: Posed) -> list[TestedEffect]:
     """Score tests of all that a fit may have left out, the largest fall of chi-square first; without those whose
     information was lost in rounding."""
     done = (problem.tested(each, number) for number, each in enumerate(problem.candidates))
     return sorted((each for each in done if each), key=lambda each: -each.drop)
 
 
-def drifts(problem: Posed, noise: Noise) -> list[Tested]:
+def drifts(problem: Posed, noise: Noise) -> list[TestedEffect]:
     """Drifts of biases that a recording shows, of the sensors whose biases may walk by this noise (`told_apart`)."""
     walking = {"gyro": noise.gyro_walk > 0.0, "accelerometer": noise.accelerometer_walk > 0.0}
     sensors = {
@@ -270,7 +270,7 @@ def drifts(problem: Posed, noise: Noise) -> list[Tested]:
     return told_apart(problem, {number: each for number, each in sensors.items() if walking[each]})
 
 
-def told_apart(problem: Posed, sensors: Mapping[int, str]) -> list[Tested]:
+def told_apart(problem: Posed, sensors: Mapping[int, str]) -> list[TestedEffect]:
     """Drifts that a recording shows, of candidates by their numbers, one or two of them.
 
     Those of gyros and of accelerometers look alike in part. Where each explains, beside the other, more than chance

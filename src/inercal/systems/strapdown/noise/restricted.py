@@ -33,7 +33,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.variances import Highest, Score, highest, second_moment, weighed
-from inercal.systems.strapdown.fit.arrow import Chain, backward, forward
+from inercal.systems.strapdown.fit.arrow import NodeChain, backward, forward
 from inercal.systems.strapdown.fit.batch import (
     Fit,
     fit,
@@ -47,7 +47,7 @@ from inercal.systems.strapdown.fit.batch import (
 from inercal.systems.strapdown.fit.rests import Nodes
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.left_out import DRIFT, Tested, drifts, posed, tests
+from inercal.systems.strapdown.noise.left_out import DRIFT, TestedEffect, drifts, posed, tests
 from inercal.systems.strapdown.settings import TURN_NOISE, WALKS, Noise, StrapdownSettings
 
 
@@ -86,7 +86,7 @@ def _second_moment(fit: Fit, others: Array, part: Array, found: float) -> Array:
     )
 
 
-def _at(fit: Fit, others: Array, part: Array, size: float) -> Solved:
+def _at(fit: Fit, others: Array, part: Array, size: float) -> SolvedChain:
     """The last linear problem of a fit with a noise of another size."""
     W = np.asarray(np.linalg.inv(others + size**2 * part))
     return solved(fit.chain._replace(W=W), fit.prior)
@@ -95,7 +95,7 @@ def _at(fit: Fit, others: Array, part: Array, size: float) -> Solved:
 _PLACES = {"gyro_walk": 2, "accelerometer_walk": 3, "turn_attitude": 4, "turn_velocity": 5}
 
 
-class Solved(NamedTuple):
+class SolvedChain(NamedTuple):
     """A linear problem solved: sum of ``squares`` with those of the prior, ``deviance`` -2 ln L but for a constant,
     residuals ``left`` (k, m) of the intervals, ``rows`` (k + 1, m + 3, n) of the elimination, ``covariance`` (p, p) and
     ``step`` (p,) of the coefficients."""
@@ -108,7 +108,7 @@ class Solved(NamedTuple):
     step: Array
 
 
-def solved(chain: Chain, prior: Array) -> Solved:
+def solved(chain: NodeChain, prior: Array) -> SolvedChain:
     """Solve a linear problem; ``prior`` (p,) are sizes of its coefficients."""
     m, p, count = chain.F.shape[1], len(prior), len(chain.rest)
     n = 2 * m + 3 + p
@@ -128,7 +128,7 @@ def solved(chain: Chain, prior: Array) -> Solved:
     volume = np.sum(np.log(pivots[:, :m])) + np.sum(np.log(pivots[ends, m:]))
     volume += np.linalg.slogdet(information * np.outer(prior, prior))[1] - np.linalg.slogdet(chain.W)[1].sum()
     total = float(squares + velocity + attitude + known)
-    return Solved(total, total + float(volume), left, rows, covariance, step)
+    return SolvedChain(total, total + float(volume), left, rows, covariance, step)
 
 
 def separated(
@@ -164,7 +164,7 @@ def _scored(fit: Fit, fixed: Array, parts: Array, s: Array, least: Array) -> Hig
     return highest(score, s, least)
 
 
-class Found(NamedTuple):
+class FoundNoise(NamedTuple):
     """Noise found from a recording, by how much -2 ln L falls by it, and the fit with it."""
 
     noise: Noise
@@ -191,7 +191,7 @@ def _changed(noise: Noise, sizes: Mapping[str, float]) -> Noise:
 
 def with_noise(
     samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit, names: tuple[str, ...]
-) -> Found | None:
+) -> FoundNoise | None:
     """The noise of the ``names`` among `settings.ESTIMABLE` as a recording shows it, and a fit with it, from a fit
     without; None where that runs off."""
     with np.errstate(all="ignore"):
@@ -205,7 +205,7 @@ def with_noise(
 
 def _iterated(
     samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit, names: tuple[str, ...]
-) -> Found | None:
+) -> FoundNoise | None:
     """The noise, of fits and linear problems in turns; raises `numpy.linalg.LinAlgError` where a matrix is singular."""
     noise = _started(settings.noise, names, LIMITS.walk_start)
     least = LIMITS.least_noise**2 * variances_of(noise)[[_PLACES[name] for name in names]]
@@ -222,19 +222,19 @@ def _iterated(
         noise = _changed(noise, dict(zip(names, np.sqrt(found.variances).tolist(), strict=True)))
     W = np.asarray(np.linalg.inv(fixed + np.einsum("q,qkab->kab", least, parts)))
     without = solved(fitted.chain._replace(W=W), fitted.prior).deviance
-    return Found(noise, without + 2.0 * found.score.value, fitted)
+    return FoundNoise(noise, without + 2.0 * found.score.value, fitted)
 
 
-class Shown(NamedTuple):
+class ShownNoise(NamedTuple):
     """A study with the noise that it left to the recording, of which ``estimate`` then names what was found, the fit
     with that, and the ``ramps`` that were shown before biases could walk."""
 
     settings: StrapdownSettings
     fit: Fit
-    ramps: tuple[Tested, ...]
+    ramps: tuple[TestedEffect, ...]
 
 
-def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit) -> Shown:
+def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit) -> ShownNoise:
     """The noise that a recording shows, from a fit without.
 
     Walks are estimated where the study states none; what turns add, where they leave too much; unless an effect outside
@@ -243,7 +243,7 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
     asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
     turns = tuple(name for name in TURN_NOISE if name in asked and residuals(fitted)[1] > LIMITS.turn_excess)
     walks = tuple(name for name in WALKS if name in asked)
-    shown = Shown(replace(settings, noise=replace(settings.noise, estimate=())), fitted, ())
+    shown = ShownNoise(replace(settings, noise=replace(settings.noise, estimate=())), fitted, ())
     for names in (turns, (*walks, *turns) if walks else ()):
         found = with_noise(samples, nodes, shown.settings, shown.fit, names) if names else None
         if not found:
@@ -252,11 +252,11 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
         if not _by_others(shown.fit, tests(problem), found.gain, found.noise.walks):
             ramps = drifts(problem, found.noise)
             noise = replace(found.noise, estimate=names)
-            shown = Shown(replace(settings, noise=noise), found.fit, tuple(ramps))
+            shown = ShownNoise(replace(settings, noise=noise), found.fit, tuple(ramps))
     return shown
 
 
-def _by_others(fitted: Fit, tested: list[Tested], gain: float, walks: bool) -> bool:
+def _by_others(fitted: Fit, tested: list[TestedEffect], gain: float, walks: bool) -> bool:
     """True where an effect outside the model that is more than chance, or a wider prior of what lies far outside its
     own, explains more than noise does by a ``gain``. Beside biases that may walk their drift is no other effect, and
     others must explain more by more than chance: a walk looks like many."""

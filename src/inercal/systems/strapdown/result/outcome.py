@@ -35,7 +35,7 @@ from inercal.systems.strapdown.model.coefficients import (
     stated,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.left_out import Tested, considered, posed, tests
+from inercal.systems.strapdown.noise.left_out import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.noise.restricted import residuals
 from inercal.systems.strapdown.result.budget import sources
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings
@@ -71,7 +71,7 @@ def assemble(
     rests: tuple[Dwell, ...],
     fit: Fit,
     settings: StrapdownSettings,
-    ramps: Sequence[Tested] = (),
+    ramps: Sequence[TestedEffect] = (),
     by_filter: Filtered | None = None,
 ) -> Estimate:
     """Put the estimate together; of the filter, where there is one, in the place of the batch's coefficients: the
@@ -317,7 +317,7 @@ def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[
     return [Finding("turn_noise", text)]
 
 
-def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
+def _left_out(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
     """The effect outside the model that explains most, where that is more than chance; else terms that usually are
     estimated and were left out, where they may shift a value by more than its u."""
     if not tested:
@@ -333,7 +333,7 @@ def _left_out(tested: list[Tested], found: tuple[str, ...], slope: Array, u: Arr
     return [_shown(tested[0], found, slope, u)]
 
 
-def _shown(best: Tested, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
+def _shown(best: TestedEffect, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
     """The finding of an effect that the recording shows; it harms the values that it would shift by more than u."""
     candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), u)
     text = (

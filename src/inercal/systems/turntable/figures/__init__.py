@@ -8,7 +8,7 @@ import numpy as np
 
 from inercal.faces.report.coefficients import budget, correlation, dots, heat, values
 from inercal.faces.report.html import Picture, render
-from inercal.faces.report.marks import Axis, Band, Dots, Level, Mark, Panel
+from inercal.faces.report.marks import Area, Axis, Dots, Level, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import NUMBERED, hemispheres
 from inercal.faces.report.style import INK, plain_unit
@@ -98,7 +98,7 @@ def _residuals(readings: Readings, fit: Regression) -> Picture:
             up=fit.noise[k] / factor if few else None,
             bar=INK,
         )
-        marks: list[Mark] = [Band(edges, -band[:, k], band[:, k], steps=True), Level(0.0), off]
+        marks: list[Mark] = [Area(edges, -band[:, k], band[:, k], steps=True), Level(0.0), off]
         up = Axis(f"{channel} [{plain_unit(readings.unit.symbol)}]")
         across = Axis("position" if k == len(readings.channels) - 1 else "", margin=0.01)
         panels.append([Panel(marks, across, up, grid="y")])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.report.html import Picture
-from inercal.faces.report.rig import Triad, Turn
+from inercal.faces.report.rig import DrawnTriad, DrawnTurn
 from inercal.faces.report.rig import rig as drawn
 from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint
 
@@ -24,7 +24,7 @@ def rig(chain: Chain) -> Picture:
             case Fixed():
                 attitude = attitude @ element.rotation
             case Joint():
-                joints.append(Turn(element.name, attitude[:, "xyz".index(element.axis)]))
+                joints.append(DrawnTurn(element.name, attitude[:, "xyz".index(element.axis)]))
     order = ", ".join(each.name for each in joints)
     return drawn(
         "Axes and signs of the table",
@@ -32,7 +32,7 @@ def rig(chain: Chain) -> Picture:
         "plus along its arrow, and the axes x, y, z of the instrument. Compare with the table: an instrument mounted "
         "another way or an angle that counts the other way shows here first.",
         joints,
-        Triad(("x", "y", "z"), attitude),
+        DrawnTriad(("x", "y", "z"), attitude),
     )
 
 

@@ -71,7 +71,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Tested:
+class TestedFault:
     """A fault that was fitted beside the terms: its ``values`` (m,), their probability by ``chance`` in a sound test,
     and the ``probability`` that it is there."""
 
@@ -91,8 +91,8 @@ class Examination:
     """The faults in the residuals: ``significant`` ones, ``doubtful`` ones that may be there, and all that were
     ``asked`` for."""
 
-    significant: tuple[Tested, ...]
-    doubtful: tuple[Tested, ...]
+    significant: tuple[TestedFault, ...]
+    doubtful: tuple[TestedFault, ...]
     asked: tuple[Seen, ...]
 
 
@@ -114,7 +114,7 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
     table = tuple(faults(means, fit))
     risk = LIMITS.residual_risk / max(len(table), 1)
     first, residuals = _seen(fit, table, risk)
-    asked, significant = first, list[Tested]()
+    asked, significant = first, list[TestedFault]()
     while True:
         tested = _likely(fit, noise, asked, residuals)
         likeliest = [*tested[:1], *_stray(means, fit, noise, risk)]
@@ -131,7 +131,7 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
     return Examination(tuple(significant), tuple(_with_probability(doubtful, len(first))), tuple(first))
 
 
-def _with_probability(doubtful: Sequence[Tested], asked: int) -> Iterator[Tested]:
+def _with_probability(doubtful: Sequence[TestedFault], asked: int) -> Iterator[TestedFault]:
     """Doubtful faults, of so many ``asked`` for, with the probability that they are there."""
     odds = LIMITS.fault_odds / max(asked, 1)
     chances = [max(each.chance, 1e-300) for each in doubtful]  # 0.0 of a number too small to be told
@@ -140,7 +140,7 @@ def _with_probability(doubtful: Sequence[Tested], asked: int) -> Iterator[Tested
         yield replace(each, probability=own / (1.0 + sum(support)))
 
 
-def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[Tested]:
+def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> Iterator[TestedFault]:
     """Drifts that the samples within the dwells show, the likeliest of each code but of ``codes``.
 
     The slopes scatter from dwell to dwell as they do, whatever the noise: an F-test of one and n - 1 degrees of
@@ -162,7 +162,7 @@ def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> I
             chance = float(fdtrc(1, len(slope) - 1, value**2 * (rate @ rate) / left)) if left else 1.0
             what = f"{fault.what.rstrip(',')}, as it drifts within the dwells,"
             seen = replace(seen, fault=replace(fault, what=what))
-            tested.append(Tested(seen, np.array([value]), chance))
+            tested.append(TestedFault(seen, np.array([value]), chance))
     named: set[str] = set()
     for each in sorted(tested, key=lambda each: each.chance):
         if each.chance < LIMITS.dwell_risk / len(tested) and each.fault.code not in named:
@@ -170,7 +170,7 @@ def _within_dwells(means: Readings, asked: Sequence[Seen], codes: set[str]) -> I
             yield each
 
 
-def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk: float) -> list[Tested]:
+def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk: float) -> list[TestedFault]:
     """The reading that lies furthest off all others, with its chance among so many; none where each is needed."""
     weight = fit.weights(fit.noise)
     n, c, _ = fit.rows.shape
@@ -192,9 +192,9 @@ def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk
 
 def _likely(
     fit: Regression, noise: Sequence[float | None], asked: Sequence[Seen], residuals: Array
-) -> list[Tested]:
+) -> list[TestedFault]:
     """Faults whose score is beyond what is usual by chance, with their F-tests, the least by chance first."""
-    by_name, tested = {each.fault.name: each for each in asked}, list[Tested]()
+    by_name, tested = {each.fault.name: each for each in asked}, list[TestedFault]()
 
     def try_all(case: Array, fits: Iterator[Fits[Array]]) -> None:
         tested.extend(f_test(fit, noise, by_name[each[-1].hypothesis.name]) for each in fits)
@@ -274,7 +274,7 @@ def _refitted(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Reg
     return fit.with_effects(fit.effects.beside(seen.fault.columns @ seen.base), noise)
 
 
-def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested:
+def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> TestedFault:
     """The F-test of a fault beside a fit, with the ``noise`` (c,) as stated."""
     from scipy.special import chdtrc, fdtrc
 
@@ -282,7 +282,7 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
     try:
         now = _refitted(fit, noise, seen)
     except np.linalg.LinAlgError:
-        return Tested(seen, np.zeros(seen.base.shape[0]), 1.0)
+        return TestedFault(seen, np.zeros(seen.base.shape[0]), 1.0)
     values, C = now.effect[before:], now.effect_covariance[before:, before:]
     statistic = float(values @ np.linalg.solve(C, values)) / m
     # share of each channel's noise in the covariance of the fault
@@ -292,4 +292,4 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
     ]
     nu = _dof(np.array(parts), now.noise_dof)
     chance = float(fdtrc(m, nu, statistic)) if nu < _MANY else float(chdtrc(m, m * statistic))
-    return Tested(seen, seen.base @ values, chance)
+    return TestedFault(seen, seen.base @ values, chance)

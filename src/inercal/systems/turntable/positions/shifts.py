@@ -13,7 +13,7 @@ from inercal.foundation.records.places import counted
 from inercal.foundation.results.budget import TypeB
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.positions.examination import Examination, Seen, Tested
+from inercal.systems.turntable.positions.examination import Examination, Seen, TestedFault
 from inercal.systems.turntable.regression import Regression
 
 _SHOWN = 4
@@ -116,7 +116,7 @@ def _weak(blind: Collection[Blind]) -> Finding:
     )
 
 
-def _hidden(tested: Tested, fit: Regression, scale: Scale) -> Array:
+def _hidden(tested: TestedFault, fit: Regression, scale: Scale) -> Array:
     """Shift (p,) of the values, over u, by the part of a fault that does not show, were it as large as the rest."""
     seen = tested.seen
     size = float(np.linalg.norm(tested.values)) / np.sqrt(max(seen.base.shape[1], 1))
@@ -143,7 +143,7 @@ def doubts(examination: Examination, fit: Regression, scale: Scale) -> list[Type
     return sources
 
 
-def _source(tested: Tested, shifts: Array) -> TypeB:
+def _source(tested: TestedFault, shifts: Array) -> TypeB:
     """A fault as a source of ``shifts`` (p, q) of the values; the base and the table are the same in repeat runs."""
     return TypeB(f"{tested.fault.what}, not excluded", 1.0, "1", shifts, redrawn=tested.fault.kind in _DRIFTS)
 

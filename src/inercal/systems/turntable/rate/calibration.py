@@ -20,7 +20,7 @@ from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.rate.cross_axis import axis_about, excess_across, fit_across
 from inercal.systems.turntable.rate.ends import settled
-from inercal.systems.turntable.rate.fit import RateFit, fit_rates, separable
+from inercal.systems.turntable.rate.fit import GyroRateFit, fit_rates, separable
 from inercal.systems.turntable.rate.linearity import SEED
 from inercal.systems.turntable.rate.outcome import assemble, unobservable
 from inercal.systems.turntable.rate.several_axes import LegStays, fit_axes, left_out, legs_of, unfit
@@ -36,7 +36,7 @@ class RateCalibration:
     estimate: Estimate
     readings: RateDwells
     inputs: tuple[Input, ...] = ()
-    fits: tuple[RateFit, ...] = ()
+    fits: tuple[GyroRateFit, ...] = ()
 
     @property
     def shown(self) -> Estimate:
@@ -239,7 +239,7 @@ def check_rate_test(settings: TurntableSettings) -> None:
         raise StudyError("site", 'no latitude, expected one such as latitude = "39.1 deg" for the earth rate')
 
 
-def _excess(fit: RateFit) -> list[Finding]:
+def _excess(fit: GyroRateFit) -> list[Finding]:
     """A finding where the readings scatter about the fit by more than their stated noise."""
     from scipy.special import chdtrc
 

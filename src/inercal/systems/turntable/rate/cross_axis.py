@@ -18,7 +18,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.positions.outcome import unit_of_term
-from inercal.systems.turntable.rate.fit import ROUNDS, RateFit, weighted, weights_of
+from inercal.systems.turntable.rate.fit import ROUNDS, GyroRateFit, weighted, weights_of
 from inercal.systems.turntable.rate.stays import Effect, Input, RateDwells, gyro_input
 from inercal.systems.turntable.regression import FLOOR
 from inercal.systems.turntable.settings import TurntableSettings
@@ -35,7 +35,7 @@ def axis_about(along: Array) -> str:
 
 def fit_across(
     dwells: RateDwells, settings: TurntableSettings, axis: str, about: str
-) -> tuple[Input, RateFit]:
+) -> tuple[Input, GyroRateFit]:
     """Bias and misalignment of a gyro that lies across the turning axis.
 
     Parameters
@@ -72,7 +72,7 @@ def fit_across(
         solution = weighted(rows, rest, weight, float(noise.std[0]))
         D, T = solution.c
     gain = solution.gain[:, :, 0]
-    fit = RateFit(
+    fit = GyroRateFit(
         axis,
         (f"D_F_{axis}", f"T_{axis}{about}"),
         np.array([D, T]),
@@ -106,7 +106,7 @@ def _with_scales(
     return replace(given, effects=tuple(effects))
 
 
-def excess_across(fit: RateFit) -> list[Finding]:
+def excess_across(fit: GyroRateFit) -> list[Finding]:
     """A finding where the readings scatter about the straight line by more than their stated noise."""
     from scipy.special import chdtrc
 

@@ -31,7 +31,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class RateFit:
+class GyroRateFit:
     """A gyro's fit.
 
     Attributes
@@ -150,7 +150,7 @@ def fit_rates(
     full_scale: float,
     rng: np.random.Generator,
     across: Across | None = None,
-) -> RateFit:
+) -> GyroRateFit:
     """Fit one gyro.
 
     Parameters
@@ -202,7 +202,7 @@ def fit_rates(
     left_over = tuple(
         largest(each, errors, span) for each in _left_over(axis, rate[own], residuals[own], remainder[own])
     )
-    return RateFit(
+    return GyroRateFit(
         axis,
         (*symbols(axis, order, asymmetry), *beside.names, *(each.name for each in left_over)),
         np.concatenate([values, [each.value for each in left_over]]),

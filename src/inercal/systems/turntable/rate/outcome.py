@@ -18,7 +18,7 @@ from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import FRAME
 from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term
-from inercal.systems.turntable.rate.fit import RateFit, approaches
+from inercal.systems.turntable.rate.fit import GyroRateFit, approaches
 from inercal.systems.turntable.rate.stays import Input, RateDwells
 from inercal.systems.turntable.settings import TurntableSettings
 
@@ -42,7 +42,7 @@ def assemble(
     settings: TurntableSettings,
     findings: Sequence[Finding],
     inputs: tuple[Input, ...],
-    fits: tuple[RateFit, ...],
+    fits: tuple[GyroRateFit, ...],
     full_scale: float,
     identified: Identifiability,
 ) -> Estimate:
@@ -133,7 +133,7 @@ def unobservable(
 
 
 def sources(
-    dwells: RateDwells, inputs: Sequence[Input], fits: Sequence[RateFit], unit: str
+    dwells: RateDwells, inputs: Sequence[Input], fits: Sequence[GyroRateFit], unit: str
 ) -> list[TypeA | TypeB]:
     """Everything the terms are uncertain by: noise of each gyro, errors of the table, its rate, the latitude.
 
@@ -172,7 +172,7 @@ def sources(
     return made
 
 
-def _bounded(names: Sequence[str], linear: Uncertainty, fits: Sequence[RateFit]) -> Uncertainty:
+def _bounded(names: Sequence[str], linear: Uncertainty, fits: Sequence[GyroRateFit]) -> Uncertainty:
     """The uncertainty with U of each largest deviation as wide as its bounds; shares and correlations stay."""
     wider = np.ones(len(names))
     for each in (each for fit in fits for each in fit.left_over):
@@ -185,7 +185,7 @@ def _bounded(names: Sequence[str], linear: Uncertainty, fits: Sequence[RateFit])
     return linear._replace(covariance=linear.covariance * scale, common=common)
 
 
-def _rows(dwells: RateDwells, given: Input, fit: RateFit, full_scale: float) -> list[dict[str, Any]]:
+def _rows(dwells: RateDwells, given: Input, fit: GyroRateFit, full_scale: float) -> list[dict[str, Any]]:
     """Residual of the best straight line in each stay, with its standard uncertainty."""
     covariance = fit.noise**2 * fit.remainder @ fit.remainder.T
     for effect in given.effects:

@@ -22,7 +22,7 @@ from inercal.foundation.findings import Finding
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.rate.cross_axis import axis_about
 from inercal.systems.turntable.rate.ends import settled
-from inercal.systems.turntable.rate.fit import Across, RateFit, fit_rates, levels
+from inercal.systems.turntable.rate.fit import Across, GyroRateFit, fit_rates, levels
 from inercal.systems.turntable.rate.linearity import SEED
 from inercal.systems.turntable.rate.stays import Effect, Input, RateDwells, gyro_input, turning_axis
 from inercal.systems.turntable.readings import apart
@@ -86,7 +86,7 @@ def fit_axes(
     axis: str,
     asymmetry: bool,
     full_scale: float,
-) -> tuple[Input, RateFit]:
+) -> tuple[Input, GyroRateFit]:
     """Fit a gyro that some leg turns about its own axis, by the stays of all legs.
 
     Parameters
@@ -119,7 +119,7 @@ def fit_axes(
         bias[leg.stays, j] = 1.0
     across = Across(about == axis, bias, tuple(f"T_{axis}{k}" for k in others), rates)
 
-    def fit(own: Input) -> RateFit:
+    def fit(own: Input) -> GyroRateFit:
         noise, rng = settings.instrument.noise, np.random.default_rng(SEED)
         return fit_rates(axis, dwells.rate, y, own, noise, test.order, asymmetry, full_scale, rng, across)
 

@@ -18,8 +18,8 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.inference.hypotheses import search
 from inercal.systems.imu.aided.diagnosis.fit_quality import mean_bias, variation, whitening
 from inercal.systems.imu.aided.diagnosis.small import constant_errors
-from inercal.systems.imu.aided.fit import Fit, noise_of
-from inercal.systems.imu.aided.table import Motion
+from inercal.systems.imu.aided.fit import AidedFit, noise_of
+from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
 
 
@@ -36,7 +36,9 @@ class Misfit:
     part: float
 
 
-def misfits(fit: Fit, names: tuple[str, ...], rows: Array, motion: Motion, gravity: float) -> list[Misfit]:
+def misfits(
+    fit: AidedFit, names: tuple[str, ...], rows: Array, motion: TableMotion, gravity: float
+) -> list[Misfit]:
     """Faults that are in the residuals, the most certain first.
 
     Parameters
@@ -66,7 +68,7 @@ def misfits(fit: Fit, names: tuple[str, ...], rows: Array, motion: Motion, gravi
     return named
 
 
-def _biases(fit: Fit, names: tuple[str, ...], patterns: Sequence[Array]) -> Array:
+def _biases(fit: AidedFit, names: tuple[str, ...], patterns: Sequence[Array]) -> Array:
     """Means (p,) of patterns in the biases of the sensors."""
     means = np.zeros(len(names))
     for k, (sensor, pattern) in enumerate(zip(fit.sensors, patterns, strict=True)):
@@ -75,7 +77,7 @@ def _biases(fit: Fit, names: tuple[str, ...], patterns: Sequence[Array]) -> Arra
     return means
 
 
-def _explains(fit: Fit, without: Fit, change: Array) -> bool:
+def _explains(fit: AidedFit, without: AidedFit, change: Array) -> bool:
     """True where outputs that shift in turns no longer do, or hardly, once a fault is taken out."""
     before = after = 0.0
     for sensor, other in zip(fit.sensors, without.sensors, strict=True):
@@ -90,7 +92,7 @@ def _explains(fit: Fit, without: Fit, change: Array) -> bool:
     return after <= LIMITS.excess_left * before
 
 
-def _part(fit: Fit, patterns: Sequence[Array]) -> float:
+def _part(fit: AidedFit, patterns: Sequence[Array]) -> float:
     """Largest rms of a pattern in an output, over the variation of its triad."""
     pairs = zip(fit.sensors, patterns, strict=True)
     return max(float(np.std(pattern) / variation(sensor.side.blocks.y)) for sensor, pattern in pairs)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.systems.imu.aided.fit import Fit, Sensor
-from inercal.systems.imu.aided.walk import Whitened, whiten
+from inercal.systems.imu.aided.fit import AidedFit, Sensor
+from inercal.systems.imu.aided.walk import WhitenedColumns, whiten
 from inercal.systems.imu.limits import LIMITS
 
 
@@ -23,11 +23,11 @@ class Whitening:
     has raised them, its pattern still explains most of what the raised levels stand for.
     """
 
-    fit: Fit
+    fit: AidedFit
     basis: Array
     factor: Array
 
-    def residuals(self, case: Fit) -> Array:
+    def residuals(self, case: AidedFit) -> Array:
         """(N,) residuals."""
         unknowns = self.fit.unknowns
         prior = (unknowns.mean - self.fit.x) / unknowns.sd
@@ -36,7 +36,7 @@ class Whitening:
         ]
         return self._left(np.concatenate([prior, *outputs]))
 
-    def misfit(self, case: Fit) -> float:
+    def misfit(self, case: AidedFit) -> float:
         """Sum of squares."""
         return float(np.sum(self.residuals(case) ** 2))
 
@@ -64,7 +64,7 @@ class Whitening:
         return np.asarray(rows - self.basis @ (self.basis.T @ rows))
 
 
-def whitening(fit: Fit) -> Whitening:
+def whitening(fit: AidedFit) -> Whitening:
     """The judge of a fit."""
     P = len(fit.x)
     rows = [np.eye(P)]
@@ -77,7 +77,7 @@ def whitening(fit: Fit) -> Whitening:
     return Whitening(fit, Q, R)
 
 
-def _whitened(sensor: Sensor, columns: Array) -> Whitened:
+def _whitened(sensor: Sensor, columns: Array) -> WhitenedColumns:
     """Columns (n, c) of the output of a sensor, whitened by its noise."""
     t, length, resting = sensor.side.blocks.middle, sensor.side.blocks.length, sensor.side.blocks.resting
     return whiten(columns, t, sensor.noise.white(length, resting), sensor.noise.wander(t, length, resting))
@@ -88,7 +88,7 @@ def mean_bias(sensor: Sensor, pattern: Array) -> float:
     return float(_whitened(sensor, pattern[:, None]).mean[0])
 
 
-def without_patterns(fit: Fit, patterns: Sequence[Array]) -> Fit:
+def without_patterns(fit: AidedFit, patterns: Sequence[Array]) -> AidedFit:
     """A fit whose outputs are less by a pattern (n,) for each sensor."""
     sensors = [
         replace(sensor, equation=replace(sensor.equation, residual=sensor.equation.residual - pattern))
@@ -102,7 +102,7 @@ def variation(y: Array) -> float:
     return float(np.sqrt(np.max(np.var(y, axis=0))))
 
 
-def knocks(fit: Fit) -> dict[str, NDArray[np.bool_]]:
+def knocks(fit: AidedFit) -> dict[str, NDArray[np.bool_]]:
     """By triad, blocks (n,) far off the median of the five around them, one or two in a row, if these are few."""
     by_triad: dict[str, NDArray[np.bool_]] = {}
     for sensor in fit.sensors:

@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.imu.aided.blocks import Blocks, small_turn
-from inercal.systems.imu.aided.table import Motion
+from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import mountings
 
@@ -36,7 +36,7 @@ def agreement(y: Array, x: Array) -> Agreement:
     return Agreement(scale, float(np.sqrt(np.sum((dy - scale * dx) ** 2) / size)))
 
 
-def expected(blocks: Blocks, motion: Motion) -> Array:
+def expected(blocks: Blocks, motion: TableMotion) -> Array:
     """Specific force in units of gravity, or rate [rad/s], (n, 3) on the instrument's axes, roughly."""
     if blocks.triad.sensor == "acc":
         return motion.attitude(blocks.middle)[:, 2, :]
@@ -44,7 +44,7 @@ def expected(blocks: Blocks, motion: Motion) -> Array:
     return np.asarray(small_turn(np.swapaxes(first, 1, 2) @ last) / blocks.length[:, None])
 
 
-def travel(motion: Motion) -> float:
+def travel(motion: TableMotion) -> float:
     """Largest angle [rad] between two attitudes about one axis of the table."""
     return float(np.max(np.ptp(motion.angles, axis=0)))
 
@@ -56,7 +56,7 @@ def tells(sensor: str, x: Array) -> bool:
     )
 
 
-def lag(blocks: Blocks, motion: Motion) -> float:
+def lag(blocks: Blocks, motion: TableMotion) -> float:
     """Time [s] in whole blocks by which the angles come late, by when table and gyro turn; 0 unless clearly better."""
     commanded = np.linalg.norm(expected(blocks, motion), axis=1)
     seen = np.linalg.norm(blocks.y - np.median(blocks.y, axis=0), axis=1)
@@ -72,7 +72,7 @@ def lag(blocks: Blocks, motion: Motion) -> float:
     return best * length if near[best + reach] > both[middle] + LIMITS.lag_correlation else 0.0
 
 
-def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
+def cures(sides: list[Blocks], motion: TableMotion) -> Iterator[str]:
     """Sentences that would make sense of outputs that do not follow the table."""
     ranked = []
     for words, other in _angles(motion):
@@ -92,7 +92,7 @@ def cures(sides: list[Blocks], motion: Motion) -> Iterator[str]:
         yield from _channels(each, x)
 
 
-def _angles(motion: Motion) -> Iterator[tuple[str, Motion]]:
+def _angles(motion: TableMotion) -> Iterator[tuple[str, TableMotion]]:
     """Other readings of the angles, and what they say."""
     joints = motion.chain.joints
     for factor, size in _FACTORS:
@@ -111,7 +111,7 @@ def _angles(motion: Motion) -> Iterator[tuple[str, Motion]]:
                     yield " and ".join(texts), replace(motion, angles=angles)
 
 
-def _mounted(motion: Motion, turn: Array) -> str:
+def _mounted(motion: TableMotion, turn: Array) -> str:
     """The mounting that turns the nominal axes by a rotation, as the study would say it."""
     from inercal.foundation.rigs.chain import Fixed
 

@@ -20,8 +20,8 @@ from inercal.foundation.inference.hypotheses import Fitted, Hypothesis
 from inercal.foundation.rigs.chain import Chain, Fixed, Joint
 from inercal.systems.imu.aided.diagnosis.fit_quality import Whitening, without_patterns
 from inercal.systems.imu.aided.diagnosis.gross import expected
-from inercal.systems.imu.aided.fit import Fit, Sensor
-from inercal.systems.imu.aided.table import Motion
+from inercal.systems.imu.aided.fit import AidedFit, Sensor
+from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
 
 STEP = 1e-6
@@ -31,7 +31,9 @@ Patterns = dict[int, Array]
 """Columns (n, q) by the number of each sensor in the fit that sees them."""
 
 
-def constant_errors(fit: Fit, motion: Motion, gravity: float, judge: Whitening) -> Iterator[Hypothesis[Fit]]:
+def constant_errors(
+    fit: AidedFit, motion: TableMotion, gravity: float, judge: Whitening
+) -> Iterator[Hypothesis[AidedFit]]:
     """All hypotheses that some output would show."""
     for name, code, patterns, words in _entries(fit, motion, gravity):
         width = next(iter(patterns.values())).shape[1]
@@ -45,13 +47,13 @@ def constant_errors(fit: Fit, motion: Motion, gravity: float, judge: Whitening) 
 
 def _error(
     name: str, code: str, columns: Sequence[Array], combinations: Array, words: Callable[[Array], str]
-) -> Hypothesis[Fit]:
+) -> Hypothesis[AidedFit]:
     """A fault of columns (n, q) in the output of each sensor; its parameters are ``combinations`` (q, m) of them."""
 
-    def without(fit: Fit, values: Array) -> Fit:
+    def without(fit: AidedFit, values: Array) -> AidedFit:
         return without_patterns(fit, [each @ (combinations @ values) for each in columns])
 
-    def says(fitted: Fitted[Fit]) -> str:
+    def says(fitted: Fitted[AidedFit]) -> str:
         return words(combinations @ fitted.values)
 
     return Hypothesis(
@@ -63,7 +65,7 @@ Entry = tuple[str, str, Patterns, Callable[[Array], str]]
 """Name, code of the finding, patterns, and the sentence from the amplitudes (q,)."""
 
 
-def _entries(fit: Fit, motion: Motion, gravity: float) -> Iterator[Entry]:
+def _entries(fit: AidedFit, motion: TableMotion, gravity: float) -> Iterator[Entry]:
     """Faults of the angles, the clock, the earth rate and the outputs."""
     outputs = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
     yield from _of_angles(fit, motion, gravity, outputs)
@@ -75,14 +77,14 @@ def _entries(fit: Fit, motion: Motion, gravity: float) -> Iterator[Entry]:
         yield from _nonlinear(fit, gravity, triad)
 
 
-def _at_fit(fit: Fit, motion: Motion, triad: str) -> Array:
+def _at_fit(fit: AidedFit, motion: TableMotion, triad: str) -> Array:
     """Force over gravity, or rate [rad/s], (n, 3) by a motion whose angles come as late as the fit says."""
     sensor = next(each for each in fit.sensors if each.side.sensor == triad)
     late = fit.references[triad].shift
     return expected(sensor.side.blocks, replace(motion, t=motion.t - late))
 
 
-def _seen(fit: Fit, changes: dict[str, Array], gravity: float) -> Patterns:
+def _seen(fit: AidedFit, changes: dict[str, Array], gravity: float) -> Patterns:
     """Outputs by changes (n, 3, q) of the force over gravity, or of the rate, by triad."""
     patterns: Patterns = {}
     for k, sensor in enumerate(fit.sensors):
@@ -93,12 +95,14 @@ def _seen(fit: Fit, changes: dict[str, Array], gravity: float) -> Patterns:
     return patterns
 
 
-def gain(fit: Fit, triad: str) -> Array:
+def gain(fit: AidedFit, triad: str) -> Array:
     """Gains (3, 3) of a triad."""
     return fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
 
 
-def _of_angles(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Array]) -> Iterator[Entry]:
+def _of_angles(
+    fit: AidedFit, motion: TableMotion, gravity: float, outputs: dict[str, Array]
+) -> Iterator[Entry]:
     """Angles of a wrong scale, and with errors that come back in each turn; axes that are not where they should be."""
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
@@ -170,7 +174,7 @@ def _round(order: int, joint: str, a: Array) -> str:
     )
 
 
-def _of_clock(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Array]) -> Entry:
+def _of_clock(fit: AidedFit, motion: TableMotion, gravity: float, outputs: dict[str, Array]) -> Entry:
     """A clock of the angles that runs at another rate."""
     middle, span = float(np.mean(motion.t)), float(np.ptp(motion.t))
     moved = replace(motion, t=middle + (motion.t - middle) * (1.0 + STEP))
@@ -186,7 +190,7 @@ def _of_clock(fit: Fit, motion: Motion, gravity: float, outputs: dict[str, Array
     )
 
 
-def _of_gyro(fit: Fit, gravity: float) -> Iterator[Entry]:
+def _of_gyro(fit: AidedFit, gravity: float) -> Iterator[Entry]:
     """Another earth rate than stated, and a gyro that feels the specific force."""
     C_bn = fit.references["gyro"].C_bn
     h = fit.x[fit.unknowns.places["earth rate"]]
@@ -221,7 +225,7 @@ def _of_gyro(fit: Fit, gravity: float) -> Iterator[Entry]:
     )
 
 
-def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Entry:
+def _memory(fit: AidedFit, motion: TableMotion, gravity: float, triad: str) -> Entry:
     """Outputs that go through a slow filter: beside the delay there is a second derivative."""
     step = LIMITS.smoothing_step
     early, now, late = (_at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-step, 0.0, step))
@@ -237,7 +241,7 @@ def _memory(fit: Fit, motion: Motion, gravity: float, triad: str) -> Entry:
     )
 
 
-def _nonlinear(fit: Fit, gravity: float, triad: str) -> Iterator[Entry]:
+def _nonlinear(fit: AidedFit, gravity: float, triad: str) -> Iterator[Entry]:
     """Outputs that go with the square or the cube of the input."""
     ref = fit.references[triad]
     x = gravity * ref.C_bn[:, :, 2] if triad == "acc" else ref.rate
