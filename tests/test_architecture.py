@@ -298,14 +298,17 @@ def test_the_package_itself_computes_nothing():
 
 def test_modules_can_be_read_in_one_go():
     lines = {module: path.read_text(encoding="utf-8").count("\n") for module, path in SOURCES.items()}
-    assert {module: count for module, count in lines.items() if count > 400} == {}
+    tables = {
+        module for module in MODULES if module.endswith(".limits")
+    }  # a line of value and words for each
+    assert {module: count for module, count in lines.items() if count > 400 and module not in tables} == {}
 
 
 #: what `tests/counts.py` counts; lowered when an issue is done
 CEILINGS = {
     "names used across folders": 1440,
     "class names shared": 5,
-    "constants outside Limits": 455,
+    "constants outside Limits": 440,
     "modules": 632,
 }
 

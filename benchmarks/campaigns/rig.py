@@ -15,7 +15,7 @@ from test_rig_states import BASE, drawn, recorded
 
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
-from inercal.systems.selfcal.settings import Model
+from inercal.systems.selfcal.settings import PlatformStates
 
 SEED = 20261123
 
@@ -23,7 +23,7 @@ SEED = 20261123
 @cache
 def posed(kinds):
     """Settings and problem of a model with these kinds of states."""
-    settings = replace(BASE, model=Model(kinds))
+    settings = replace(BASE, model=PlatformStates(kinds))
     return settings, problem(settings)
 
 

@@ -12,7 +12,7 @@ from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from inercal.systems.selfcal.platform.states import BIAS_WALK, EXTENDED_MODEL
-from inercal.systems.selfcal.settings import Disturbances, Model, Noise
+from inercal.systems.selfcal.settings import Disturbances, Noise, PlatformStates
 
 STUDY = study(path="best")
 COARSE = Noise(0.1 * DEG / 60.0, 5000.0 * MICRO_G, 600.0 * ARCSEC)
@@ -165,7 +165,7 @@ def test_flicker_of_accelerometers_is_no_walk_of_the_gyros(floor, words):
 @pytest.mark.slow
 def test_biases_that_walk_more_than_stated_are_told_by_how_much():
     """Where they are states already, and what is stated of them is too little."""
-    asked = replace(STUDY, model=Model((*EXTENDED_MODEL[:6], *BIAS_WALK)))
+    asked = replace(STUDY, model=PlatformStates((*EXTENDED_MODEL[:6], *BIAS_WALK)))
     noisy = replace(asked, disturbances=Disturbances(flicker=3.0 * MICRO_G))
     found = only(named(recorded(noisy), asked), "unmodelled")
     assert "biases that wander" in found.message

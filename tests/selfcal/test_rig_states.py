@@ -29,7 +29,7 @@ from inercal.systems.selfcal.platform.states import (
     WALK,
 )
 from inercal.systems.selfcal.result.outcome import assemble
-from inercal.systems.selfcal.settings import Model
+from inercal.systems.selfcal.settings import PlatformStates
 from inercal.systems.selfcal.still_joints import still_joints, told_apart
 
 WHOLE = (
@@ -116,7 +116,7 @@ def without(kinds, c):
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("gimbals", [Gimbals(), Gimbals(("y", "z", "x"), (1, -1, -1))])
 def test_columns_of_the_encoders_are_derivatives(gimbals, exact):
-    settings = study(model=Model(WHOLE), gimbals=gimbals)
+    settings = study(model=PlatformStates(WHOLE), gimbals=gimbals)
     posed, rng = problem(settings), np.random.default_rng(5)
     c, th, w = random_vector(rng, settings), rng.uniform(-1.2, 1.2, 3), 0.3 * rng.standard_normal(3)
     c = without(("delay", "sag") if exact else (), c)
@@ -153,7 +153,7 @@ def test_columns_of_the_encoders_are_derivatives(gimbals, exact):
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_rows_of_the_accelerometers_are_derivatives(seed, exact):
-    settings = study(model=Model(WHOLE))
+    settings = study(model=PlatformStates(WHOLE))
     posed, rng = problem(settings), np.random.default_rng(seed)
     c, w = random_vector(rng, settings), 0.03 * rng.standard_normal(3)
     c = without(("delay", "k2", "ka1_T1") if exact else (), c)
@@ -191,7 +191,7 @@ def test_rows_of_the_accelerometers_are_derivatives(seed, exact):
 
 @pytest.mark.kernels
 def test_columns_of_a_step_are_derivatives():
-    settings = study(model=Model(WHOLE))
+    settings = study(model=PlatformStates(WHOLE))
     posed, rng = problem(settings), np.random.default_rng(7)
     c, w, dt = random_vector(rng, settings), 0.3 * rng.standard_normal(3), 0.2
     start, layout = Rotation.random(random_state=1), posed.states.layout
@@ -319,7 +319,7 @@ BASE = study(prior=np.append(study().prior[:18], [100e-6] * 3 + [60 * ARCSEC] * 
 @pytest.mark.parametrize("kind", [kind for kind in WHOLE if kind not in (*EXTENDED_MODEL, *BIAS_WALK)])
 def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
     """All states within 4.5 u of the truth, and those asked for are worth something; without them all is wrong."""
-    settings = replace(BASE, model=Model((*PAPER_KINDS, kind)))
+    settings = replace(BASE, model=PlatformStates((*PAPER_KINDS, kind)))
     posed, rng = problem(settings), np.random.default_rng(11)
     c = drawn(settings, rng, (*PAPER_KINDS, kind))
     recording = recorded(settings, c, rng)
@@ -337,7 +337,7 @@ def test_each_state_is_found_in_a_recording_by_another_simulator(kind):
 @pytest.mark.parametrize("kind", ["error-state", "map"])
 def test_estimators_agree_on_a_rig_with_all_errors(kind):
     kinds = tuple(each for each in WHOLE if kind != "map" or each not in BIAS_WALK)
-    settings = replace(BASE, model=Model(kinds))
+    settings = replace(BASE, model=PlatformStates(kinds))
     posed, rng = problem(settings).for_kind(kind), np.random.default_rng(12)
     c = drawn(settings, rng, STATES, delay=0.1)
     found = estimate(recorded(settings, c, rng), posed, kind, history=False)
@@ -351,7 +351,7 @@ def test_estimators_agree_on_a_rig_with_all_errors(kind):
 def test_uncertainties_of_rig_states_hold(draws):
     """NEES of the states over draws from their priors, within limits that 1 in 10000 leaves; of each state the mean of
     squared errors over u^2, within limits that 1 in 10000 leaves of all."""
-    settings = replace(BASE, model=Model(RIG))
+    settings = replace(BASE, model=PlatformStates(RIG))
     posed, rng, total = problem(settings), np.random.default_rng(13), 0.0
     squares = np.zeros(len(posed.names))
     for _ in range(draws):
@@ -381,7 +381,7 @@ def test_sensitivities_are_those_of_the_filter_run_again():
         ends = [
             estimate(
                 recording,
-                problem(replace(BASE, model=Model(None, {name: (by, 0.0)}))),
+                problem(replace(BASE, model=PlatformStates(None, {name: (by, 0.0)}))),
                 "error-state",
                 None,
                 False,
@@ -397,7 +397,7 @@ def test_sensitivities_are_those_of_the_filter_run_again():
 def test_what_is_stated_but_not_estimated_enters_u():
     """gamma stated as 0(5) arcsec: u of the coefficients covers errors of so much, which the paper's model does not."""
     gamma = dict.fromkeys(STATES["gamma"].parameters, (0.0, 5 * ARCSEC))
-    settings = replace(BASE, model=Model(None, gamma))
+    settings = replace(BASE, model=PlatformStates(None, gamma))
     rng = np.random.default_rng(15)
     c = drawn(BASE, rng, PAPER_KINDS)
     c[[ALL.index(name) for name in gamma]] = 5 * ARCSEC
@@ -429,10 +429,10 @@ def test_joints_that_stand_still_leave_states_out():
     th = np.zeros((10, 3))
     th[:, 0] = np.linspace(0.0, 1.0, 10)
     th[:, 2] = np.linspace(0.0, 2.0, 10)
-    settings, said = told(replace(BASE, model=Model(RIG)), th)
+    settings, said = told(replace(BASE, model=PlatformStates(RIG)), th)
     assert not {"nonorth_xy", "nonorth_yz"} & set(settings.states.names)
     assert len(settings.states.names) == 30
     assert said[0].message.startswith("nonorth_xy, nonorth_yz: th_y stands still")
     assert told(BASE, th) == (BASE, ())
     th[:, 1] = np.linspace(0.0, 0.5, 10)
-    assert told(replace(BASE, model=Model(RIG)), th)[1] == ()
+    assert told(replace(BASE, model=PlatformStates(RIG)), th)[1] == ()

@@ -26,7 +26,7 @@ from inercal.systems.selfcal.platform.states import (
     USUAL_WAVES,
     WORDS,
 )
-from inercal.systems.selfcal.settings import Model
+from inercal.systems.selfcal.settings import PlatformStates
 
 _KINDS = tuple(kind for kind, state in STATES.items() if state.key and kind != "harmonics")
 
@@ -146,7 +146,7 @@ class ModelTable(_MODEL):  # type: ignore[misc]
     )
 
 
-def model_of(table: Any, filter: Any, where: object) -> Model:
+def model_of(table: Any, filter: Any, where: object) -> PlatformStates:
     """The model that a study states, without ``states`` that of the rig for estimators that have it.
 
     Raises `StudyError` for states beside ``extended``, for an estimator that does not have them, and for one that is
@@ -190,7 +190,7 @@ def model_of(table: Any, filter: Any, where: object) -> Model:
             raise StudyError(where, f"{text}, expected 0 with an uncertainty, such as 0(5) arcsec")
         for name in STATES["harmonics"].parameters[2 * k : 2 * k + 2]:
             stated[name] = (0.0, each.amplitude.u)
-    return Model(states, stated, harmonics=waves)
+    return PlatformStates(states, stated, harmonics=waves)
 
 
 def on_rig(table: Any) -> Array:

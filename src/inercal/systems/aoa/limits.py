@@ -396,5 +396,32 @@ class Limits:
     silent_time: float = 1.0
     """Time [s] without a number after which a gyro is said to be silent on a stream."""
 
+    impossible_arm: float = 10.0
+    """Lever arm [m] that is named whatever the motion shows of it: no tunnel has room for it."""
+
+    alike_errors: int = 3
+    """Errors told at most as equally possible: each is a run of the filter."""
+
+    alike_squares: float = 4.0
+    """Difference of the sums of squared innovations under two errors of which neither is likelier."""
+
+    unseen_axis: float = math.radians(0.05)
+    """Turn of an accelerometer's axis [rad] that is tried: of a mount that was made, and not measured."""
+
+    clipped_part: float = 0.01
+    """Part of the rows of a point from which clipped ones are told."""
+
+    points_apart: float = 0.25
+    """Part of the usual step between points by which points of several runs may differ and be the same."""
+
+    oscillations_alike: float = 0.05
+    """Relative difference of amplitudes and of frequencies up to which oscillations are repeats."""
+
+    sine_share: float = 0.9
+    """Part of the variance of the angle that a sine explains where a run oscillates."""
+
+    fewest_rests: int = 4
+    """Rests from which three coefficients of an accelerometer are fitted."""
+
 
 LIMITS = Limits()

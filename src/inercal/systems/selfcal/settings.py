@@ -135,7 +135,7 @@ class Filter:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class PlatformStates:
     """The model of the platform: kinds of ``states`` (None: the paper's, with the extended model where the filter has
     it), and, by name of parameter, what is ``stated`` of those of the rig: value and standard uncertainty [SI].
     ``left_out``: parameters of these kinds that a recording cannot tell from others; ``harmonics`` by joint 0, 1, 2 and
@@ -273,7 +273,7 @@ class SelfcalSettings:
     truth: Array | None = None
     goal: Mapping[str, float] = field(default_factory=dict)
     filter: Filter = field(default_factory=Filter)
-    model: Model = field(default_factory=Model)
+    model: PlatformStates = field(default_factory=PlatformStates)
     disturbances: Disturbances = field(default_factory=Disturbances)
     search: Search = field(default_factory=Search)
     placed: tuple[RecordOnBase, ...] = ()

@@ -102,6 +102,25 @@ class Limits:
     scale_sigmas: float = 5.0
     """Scale factor, over its standard uncertainty, below which an output does not follow the rate."""
 
+    most_faults: int = 4
+    """Faults named at most, one beside the other."""
+
+    simpler_fault: float = 0.8
+    """Logarithm of a fault's chance, over that of the likeliest, with which one of fewer parameters goes first."""
+
+    known_variance: float = 1e6
+    """Degrees of freedom from which a variance counts as known."""
+
+    fewest_degrees: float = 10.0
+    """Degrees of freedom of the noise, in every channel, below which a stray reading is not told from chance: of 250
+    sound tumbles with some five 3 were named."""
+
+    least_seen: float = 0.01
+    """Part of a fault's effect outside the terms below which it does not show."""
+
+    outside_zone: int = 2
+    """Distinct inputs that are to lie beyond a dead zone on either side."""
+
 
 LIMITS = Limits()
 """The limits in force."""

@@ -41,10 +41,6 @@ _BESIDE = {
 }
 
 
-IMPOSSIBLE_ARM = 10.0
-"""Lever arm [m] that is named whatever the motion shows of it: no tunnel has room for it."""
-
-
 @dataclass(frozen=True, eq=False)
 class _Explanation:
     """Faults taken out together, and the quality of the fit without them."""
@@ -143,11 +139,11 @@ def _far_away(settings: AoaSettings) -> list[Finding]:
     layout = settings.layout
     k = int(np.argmax(np.abs(layout.r)))
     arm = float(layout.r[k])
-    if not abs(arm) > IMPOSSIBLE_ARM:
+    if not abs(arm) > LIMITS.impossible_arm:
         return []
     text = (
         f"{layout.names[k]} is stated {abs(arm):g} m from the pivot, where arms of models are "
-        f"shorter than {IMPOSSIBLE_ARM:g} m"
+        f"shorter than {LIMITS.impossible_arm:g} m"
     )
     return [Finding("unit_suspect", text, harm=EVERYTHING, action="write r with its unit")]
 

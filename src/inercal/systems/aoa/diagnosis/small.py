@@ -24,12 +24,6 @@ from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings
 
-_ALIKE = 3
-"""Errors told at most as equally possible: each is a run of the filter."""
-
-ALIKE_SQUARES = 4.0
-"""Difference of the sums of squared innovations under two errors of which neither is likelier."""
-
 
 class Fusion:
     """The fusion as a judge: innovations without a gate and without wild ones, and a misfit that these hardly move."""
@@ -67,7 +61,7 @@ def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
     """
 
     def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-        return _least(itertools.islice(fits, _ALIKE + 1), _squares, ALIKE_SQUARES)
+        return _least(itertools.islice(fits, LIMITS.alike_errors + 1), _squares, LIMITS.alike_squares)
 
     found, then = search(case, _beside_the_gyro, JUDGE, 1.0, 1, choose=likeliest)
     return found[-1] if found and _squares(then) < _squares(other) else None

@@ -25,9 +25,6 @@ from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings
 
-UNSEEN_AXIS = math.radians(0.05)
-"""Turn of an accelerometer's axis [rad] that is tried: of a mount that was made, and not measured."""
-
 
 def unseen(
     recording: Recording, problem: FusionProblem, settings: AoaSettings, named: bool = False
@@ -36,7 +33,7 @@ def unseen(
     than noise are ``named`` already; else ``weak_test``: what would shift the angle by over twice u, unnoticed.
 
     That is a gyro's scale that is off by `Limits.unseen_scale`, or as far as the recording does not contradict it, a
-    bias that drifts by `Limits.unseen_drift` where no random walk is stated, an axis turned by `UNSEEN_AXIS`.
+    bias that drifts by `Limits.unseen_drift` where no random walk is stated, an axis turned by `Limits.unseen_axis`.
     """
     part = stretch(recording)
     own = alone(part, problem)
@@ -97,7 +94,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     plain = estimate(part, posed(settings, part.spatial))
     worst: tuple[float, str, AngleEffect] | None = None
     for k, name in enumerate(settings.layout.names):
-        for size in (UNSEEN_AXIS, -UNSEEN_AXIS):  # it may be off already, and back is no error
+        for size in (LIMITS.unseen_axis, -LIMITS.unseen_axis):  # it may be off already, and back is no error
             turned = with_axis(settings, k, size)
             found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
             if found is None or not found.ratio > LIMITS.unseen_sigmas:
@@ -108,7 +105,7 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     if worst is None:
         return []
     shift, name, found = worst
-    what = f"an axis of {name} turned by {math.degrees(UNSEEN_AXIS):g} deg"
+    what = f"an axis of {name} turned by {math.degrees(LIMITS.unseen_axis):g} deg"
     return [_weak(what, shift, found, "Fit the axes to a reference angle, or move through more angles.")]
 
 

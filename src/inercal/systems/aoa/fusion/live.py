@@ -18,7 +18,7 @@ from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion import loop
 from inercal.systems.aoa.fusion import run as fusion
 from inercal.systems.aoa.fusion.filter_result import roll_of
-from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, KeptStates, MeasurementRows
+from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, FusedRows, Kept
 from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later, set_back
@@ -77,7 +77,7 @@ class Live:
         self._dt, self._row = np.empty(1), np.empty((1, problem.count + BESIDE))
         self._out = np.empty((1, OUTPUTS + problem.count + 1))
         self._kept = np.empty((int(problem.spatial), 2 * problem.size))
-        rows, kept = MeasurementRows(self._dt, self._row), KeptStates(self._kept, 1, 0)
+        rows, kept = FusedRows(self._dt, self._row), Kept(self._kept, 1, 0)
         self._arguments = rows, problem.model, self._out, kept, loop.NONE, loop.NO_MOTIONS
         belief = Belief(self._fusion.x, self._fusion.P, self._fusion.turns)
         self._advance = compiled(loop._advance, belief, *self._arguments)
@@ -173,7 +173,7 @@ class Live:
 def load_kernels(problem: FusionProblem) -> None:
     """Load, or compile, the kernels of the causal fusion."""
     belief = Belief(problem.mean.copy(), problem.covariance.copy(), np.zeros(problem.count + 3))
-    rows = MeasurementRows(np.empty(0), np.empty((0, problem.count + BESIDE)))
+    rows = FusedRows(np.empty(0), np.empty((0, problem.count + BESIDE)))
     loop.advance(belief, rows, problem.model, np.empty((0, OUTPUTS + problem.count + 1)))
 
 

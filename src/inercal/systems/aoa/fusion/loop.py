@@ -22,8 +22,8 @@ from inercal.foundation.inference.kalman import SlopeRow, empty_row
 from inercal.systems.aoa.fusion.model import (
     WIDEST,
     Constants,
-    FusionModel,
     FusionStep,
+    Model,
     Places,
     Prediction,
     accelerometer,
@@ -67,7 +67,7 @@ class Belief(NamedTuple):
     turns: Array
 
 
-class MeasurementRows(NamedTuple):
+class FusedRows(NamedTuple):
     """Rows of measurements: ``dt`` (m,) [s] since the row before; ``z`` (m, N + 5) the accelerometers [m/s^2], the gyro
     [rad/s], a stated angle and its standard uncertainty [rad], roll and yaw gyros [rad/s]; NaN where not measured."""
 
@@ -75,7 +75,7 @@ class MeasurementRows(NamedTuple):
     z: Array
 
 
-class KeptStates(NamedTuple):
+class Kept(NamedTuple):
     """States kept for pictures: ``states`` (k, 2 n) receives x and its standard deviations at each ``every``-th row,
     counted from ``first``; none with 0 rows."""
 
@@ -84,7 +84,7 @@ class KeptStates(NamedTuple):
     first: int
 
 
-NOT_KEPT = KeptStates(np.empty((0, 0)), 1, 0)
+NOT_KEPT = Kept(np.empty((0, 0)), 1, 0)
 
 NO_MOTIONS = np.empty((0, MOTION))
 
@@ -152,7 +152,7 @@ def congruent(P: Array, moving: Indices, F: Array, Q: Array, work: Array) -> Non
 
 
 @kernel
-def go_on(belief: Belief, step: FusionStep, model: FusionModel, F: Array, Q: Array, work: Array) -> None:
+def go_on(belief: Belief, step: FusionStep, model: Model, F: Array, Q: Array, work: Array) -> None:
     """The state and its covariance after a step."""
     x, P, moving, roll = belief.x, belief.P, model.places.moving, model.places.roll
     d, theta, phi = len(F), 0.0, 0.0
@@ -207,9 +207,7 @@ def update(
 
 
 @kernel
-def reading(
-    i: int, at: Prediction, angle_u: float, model: FusionModel, out: SlopeRow
-) -> tuple[float, float, int]:
+def reading(i: int, at: Prediction, angle_u: float, model: Model, out: SlopeRow) -> tuple[float, float, int]:
     """Reading of scalar ``i`` of a row of measurements at a prediction, its variance, and its entries in ``out``.
 
     ``angle_u`` [rad] is the standard uncertainty of a stated angle; ``out`` receives the derivatives by the state.
@@ -277,7 +275,7 @@ def write(x: Array, P: Array, constants: Constants, out: Array, k: int) -> None:
 
 
 @kernel
-def moving(x: Array, P: Array, p: float, y: float, model: FusionModel, out: Array) -> None:
+def moving(x: Array, P: Array, p: float, y: float, model: Model, out: Array) -> None:
     """Put theta, rate, acceleration and jerk into ``out`` (`MOTION`,), their covariance, cosine of the roll and rate of
     theta by yaw, the roll, its u and its rate; ``p``, ``y`` are indications of the roll and yaw gyros."""
     roll = model.places.roll
@@ -295,10 +293,10 @@ def moving(x: Array, P: Array, p: float, y: float, model: FusionModel, out: Arra
 
 def advance(
     belief: Belief,
-    rows: MeasurementRows,
-    model: FusionModel,
+    rows: FusedRows,
+    model: Model,
     out: Array,
-    kept: KeptStates = NOT_KEPT,
+    kept: Kept = NOT_KEPT,
     memory: Memory = NONE,
     motions: Array = NO_MOTIONS,
 ) -> int:
@@ -316,13 +314,7 @@ def advance(
 
 @allocating
 def _advance(
-    belief: Belief,
-    rows: MeasurementRows,
-    model: FusionModel,
-    out: Array,
-    kept: KeptStates,
-    memory: Memory,
-    motions: Array,
+    belief: Belief, rows: FusedRows, model: Model, out: Array, kept: Kept, memory: Memory, motions: Array
 ) -> int:
     """The loop of `advance`."""
     x, P, turns = belief

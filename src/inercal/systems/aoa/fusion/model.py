@@ -93,7 +93,7 @@ class Constants(NamedTuple):
     plunge: float
 
 
-class FusionModel(NamedTuple):
+class Model(NamedTuple):
     """The model as kernels take it: ``geometry`` (N, 4) of the accelerometers, cos lambda, sin lambda, r, z [m]; places
     and constants."""
 
@@ -149,7 +149,7 @@ _NEAR_VERTICAL = 1e-4
 
 
 @kernel
-def accelerometer(i: int, at: Prediction, model: FusionModel, out: SlopeRow) -> tuple[float, float, int]:
+def accelerometer(i: int, at: Prediction, model: Model, out: SlopeRow) -> tuple[float, float, int]:
     """Reading of accelerometer ``i`` [m/s^2], its variance, and how many entries of ``out`` are its derivative.
 
     The noise of the roll and yaw gyros adds to its variance.
@@ -220,7 +220,7 @@ def accelerometer(i: int, at: Prediction, model: FusionModel, out: SlopeRow) -> 
 
 
 @kernel
-def gyro(at: Prediction, model: FusionModel, out: SlopeRow) -> tuple[float, float, int]:
+def gyro(at: Prediction, model: Model, out: SlopeRow) -> tuple[float, float, int]:
     """Reading of the gyro [rad/s] at a state, as of `accelerometer`."""
     _, of, constants = model
     places, row, x = out.places, out.values, at.x
@@ -242,7 +242,7 @@ def gyro(at: Prediction, model: FusionModel, out: SlopeRow) -> tuple[float, floa
 
 
 @kernel
-def transition(dt: float, model: FusionModel, F: Array, Q: Array) -> None:
+def transition(dt: float, model: Model, F: Array, Q: Array) -> None:
     """Transition of the states that move in ``dt`` [s]: theta to jerk under white snap, resonators under white noise.
 
     ``F`` (d, d) receives it, ``Q`` (d, d) its noise. Exact (Van Loan's integrals in closed form). Those of a state of
@@ -275,7 +275,7 @@ def transition(dt: float, model: FusionModel, F: Array, Q: Array) -> None:
 
 
 @kernel
-def wander(P: Array, dt: float, model: FusionModel) -> None:
+def wander(P: Array, dt: float, model: Model) -> None:
     """Add to P (n, n) what the biases of the gyro and the accelerometers wander in ``dt`` [s]; of other gyros,
     `turning`."""
     constants = model.constants
@@ -302,7 +302,7 @@ def _resonate(dt: float, of: Resonator, i: int, F: Array, Q: Array) -> None:
 
 
 @kernel
-def turning(x: Array, step: FusionStep, model: FusionModel, F: Array, Q: Array) -> tuple[float, float]:
+def turning(x: Array, step: FusionStep, model: Model, F: Array, Q: Array) -> tuple[float, float]:
     """Put the rows of theta and roll into ``F`` and ``Q``; theta and roll [rad] after the step."""
     dt = step.dt
     a, roll = len(model.places.moving) - 3, model.places.roll

@@ -11,7 +11,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.aoa.band import WHOLE, Band
-from inercal.systems.aoa.fusion.model import BIASES, Constants, FusionModel, Places
+from inercal.systems.aoa.fusion.model import BIASES, Constants, Model, Places
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.settings import AoaSettings
 
@@ -27,7 +27,7 @@ class FusionProblem:
     """The problem of the fusion, without the recording.
 
     ``names`` (n,) of the states; ``mean`` (n,) and ``covariance`` (n, n) of all but the four of motion, which have none
-    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.systems.aoa.fusion.model.FusionModel`,
+    before the start; ``places``, ``constants`` and ``geometry`` as in `inercal.systems.aoa.fusion.model.Model`,
     the noise that of a fused row; ``band`` of the sensors before.
     """
 
@@ -41,9 +41,9 @@ class FusionProblem:
     band: Band = WHOLE
 
     @cached_property
-    def model(self) -> FusionModel:
+    def model(self) -> Model:
         """Geometry, places and constants, for kernels."""
-        return FusionModel(self.geometry, self.places, self.constants)
+        return Model(self.geometry, self.places, self.constants)
 
     @property
     def count(self) -> int:

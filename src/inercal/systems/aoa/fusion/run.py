@@ -26,7 +26,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.aoa.fusion import loop
-from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, KeptStates, MeasurementRows
+from inercal.systems.aoa.fusion.loop import BESIDE, OUTPUTS, Belief, FusedRows, Kept
 from inercal.systems.aoa.fusion.model import GYRO_BIAS
 from inercal.systems.aoa.fusion.problem import START, FusionProblem
 from inercal.systems.aoa.limits import LIMITS
@@ -140,8 +140,8 @@ def advance(
             F = fade(x, P, problem, steps)
         stop = next_fading(t, at, since)
         stop = min(stop, at + block) if block else stop
-        part = MeasurementRows(dt[at:stop], rows[at:stop])
-        belief, keep = Belief(x, P, turns), KeptStates(kept, every, first + at)
+        part = FusedRows(dt[at:stop], rows[at:stop])
+        belief, keep = Belief(x, P, turns), Kept(kept, every, first + at)
         before = _apart(belief) if block else belief
         done = loop.advance(belief, part, problem.model, out[at:stop], keep, motions=motions[at:stop])
         if block:

@@ -26,14 +26,14 @@ from inercal.systems.aoa.fusion.loop import (
     NOT_KEPT,
     OUTPUTS,
     Belief,
-    KeptStates,
-    MeasurementRows,
+    FusedRows,
+    Kept,
     Memory,
     congruent,
     root,
     write,
 )
-from inercal.systems.aoa.fusion.model import FusionModel
+from inercal.systems.aoa.fusion.model import Model
 from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.run import FusionTrace, Head, unknown
 
@@ -70,8 +70,8 @@ def smooth(
     causal = np.empty((longest, OUTPUTS + problem.count + 1))
     for block, before, F in reversed(trace.heads):
         belief = Belief(*(each.copy() for each in before))
-        done = loop.advance(belief, MeasurementRows(dt[block], rows[block]), model, causal, memory=memory)
-        _backward(lam, Lam, memory, done, model, out[block], KeptStates(states, every, block.start))
+        done = loop.advance(belief, FusedRows(dt[block], rows[block]), model, causal, memory=memory)
+        _backward(lam, Lam, memory, done, model, out[block], Kept(states, every, block.start))
         if F is not None:
             with np.errstate(over="ignore", invalid="ignore"):  # what has lost its numbers stays without
                 lam[:], Lam[:] = F.T @ lam, F.T @ Lam @ F
@@ -93,7 +93,7 @@ def load_kernels(problem: FusionProblem) -> None:
 
 @allocating
 def _backward(
-    lam: Array, Lam: Array, memory: Memory, size: int, model: FusionModel, out: Array, kept: KeptStates
+    lam: Array, Lam: Array, memory: Memory, size: int, model: Model, out: Array, kept: Kept
 ) -> None:
     """Go back over ``size`` rows that the filter remembers: ``lam`` and ``Lam`` from their end to their beginning."""
     steps, after, scalars = memory

@@ -29,9 +29,6 @@ from inercal.systems.aoa.settings import AoaSettings
 
 Stretch = tuple[int, int]
 
-_LEAST = 4
-"""Rests from which three coefficients of an accelerometer are fitted."""
-
 _SIGMAS = (0.0, *np.geomspace(1e-7, 0.1, 32).tolist())
 """Standard deviations [rad] of a reading of the reference that are tried; the last is of no use."""
 
@@ -64,9 +61,9 @@ def static_fit(recording: Recording, settings: AoaSettings, points: Sequence[Str
     assert recording.reference is not None
     theta, means, u, rates = _rests(recording, points)
     n, count = len(settings.layout.names), len(theta)
-    if count < _LEAST:
+    if count < LIMITS.fewest_rests:
         raise RecordError(
-            "theta_ref", f"found {count} rests with a reference angle, expected {_LEAST} or more"
+            "theta_ref", f"found {count} rests with a reference angle, expected {LIMITS.fewest_rests} or more"
         )
     names, units, usual, start = fit_terms(settings)
     wide = LIMITS.widened_prior * usual

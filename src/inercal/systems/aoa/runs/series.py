@@ -230,10 +230,6 @@ def _without_biases(settings: AoaSettings, known: Posterior) -> AoaSettings:
     return replace(settings, sensors=sensors)
 
 
-_ALARM = 0.01
-"""Part of the rows of a point from which clipped ones are told."""
-
-
 def _clipped(measured: Sequence[MeasuredRun]) -> list[Finding]:
     """``saturation``: points in which a sensor is clipped, by run."""
     found = []
@@ -243,13 +239,13 @@ def _clipped(measured: Sequence[MeasuredRun]) -> list[Finding]:
             continue
         rows = np.asarray(masked.any(axis=1))
         worst = [(rows[p.start : p.stop].mean(), p.number) for p in done.measurement.points]
-        worst = [(share, number) for share, number in worst if share > _ALARM]
+        worst = [(share, number) for share, number in worst if share > LIMITS.clipped_part]
         if worst:
             numbers = ", ".join(f"{number:g}" for _, number in worst[:8])
             many = f"{len(worst)} of {len(done.measurement.points)}: points {numbers}"
             text = (
                 f"{done.run.name}: sensors are clipped in {100.0 * max(worst)[0]:.2g} % of the rows of a point "
-                f"at most, more than {100.0 * _ALARM:g} % in {many}"
+                f"at most, more than {100.0 * LIMITS.clipped_part:g} % in {many}"
             )
             found.append(Finding("saturation", text, harm=()))
     return found

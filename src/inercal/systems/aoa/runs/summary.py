@@ -52,16 +52,6 @@ class OscillationRuns:
     errors: Mapping[str, float] = field(default_factory=dict)
 
 
-_APART = 0.25
-"""Part of the usual step between points by which points of several runs may differ and be the same."""
-
-_ALIKE = 0.05
-"""Relative difference of amplitudes and of frequencies up to which oscillations are repeats."""
-
-_SINE = 0.9
-"""Part of the variance of the angle that a sine explains where a run oscillates."""
-
-
 def by_point(runs: Sequence[tuple[Role, Measurement]]) -> tuple[AtPoint, ...]:
     """The points of all runs, those of about the same angle together, by angle."""
     each = [(role, point) for role, measured in runs for point in measured.points]
@@ -72,7 +62,7 @@ def by_point(runs: Sequence[tuple[Role, Measurement]]) -> tuple[AtPoint, ...]:
     ]
     if not each:
         return ()
-    apart = _APART * float(np.median(steps)) if steps else math.inf
+    apart = LIMITS.points_apart * float(np.median(steps)) if steps else math.inf
     each.sort(key=lambda pair: pair[1].theta)
     cuts = np.flatnonzero(np.diff([point.theta for _, point in each]) > apart) + 1
     groups = np.split(np.arange(len(each)), cuts)
@@ -120,7 +110,10 @@ def oscillations(runs: Sequence[tuple[Run, Measurement]]) -> tuple[OscillationRu
         if not (amplitude > 0.0 and frequency > 0.0):
             continue
         for group in groups:
-            if abs(group[0][0] / amplitude - 1.0) < _ALIKE and abs(group[0][1] / frequency - 1.0) < _ALIKE:
+            if (
+                abs(group[0][0] / amplitude - 1.0) < LIMITS.oscillations_alike
+                and abs(group[0][1] / frequency - 1.0) < LIMITS.oscillations_alike
+            ):
                 group.append((amplitude, frequency, measured))
                 break
         else:
@@ -192,7 +185,7 @@ def sine_of(measured: Measurement) -> tuple[float, float]:
             other = _fit(grid, even, float(near))
             if other[1] > explained:
                 peak, (amplitude, explained) = float(near), other
-    return (amplitude, peak) if explained > _SINE else (math.nan, math.nan)
+    return (amplitude, peak) if explained > LIMITS.sine_share else (math.nan, math.nan)
 
 
 def _fit(t: Array, x: Array, frequency: float) -> tuple[float, float]:

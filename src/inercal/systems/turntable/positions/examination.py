@@ -27,24 +27,8 @@ from inercal.systems.turntable.readings import Readings
 from inercal.systems.turntable.regression import Regression
 from inercal.systems.turntable.weights import whitened
 
-MOST = 4
-"""Faults named at most, one beside the other."""
-
-_SIMPLER = 0.8
-"""Logarithm of the chance of a fault, over that of the likeliest, with which one of fewer parameters goes before it."""
-
 _TINY = 1e-300
 """Least chance that has a logarithm."""
-
-_MANY = 1e6
-"""Degrees of freedom from which a variance counts as known."""
-
-_FEW = 10.0
-"""Degrees of freedom of the noise, in every channel, below which a stray reading is not told from chance: of 250 sound
-tumbles with some five 3 were named."""
-
-_SEEN = 0.01
-"""Part of a fault's effect outside the terms below which it does not show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +103,7 @@ def examine(means: Readings, fit: Regression, noise: Sequence[float | None]) -> 
         tested = _likely(fit, noise, asked, residuals)
         likeliest = [*tested[:1], *_stray(means, fit, noise, risk)]
         found = min(likeliest, key=lambda each: each.chance, default=None)
-        if found is None or found.chance > risk or len(significant) == MOST:
+        if found is None or found.chance > risk or len(significant) == LIMITS.most_faults:
             break
         significant.append(found)
         fit = _refitted(fit, noise, found.seen)
@@ -180,8 +164,8 @@ def _stray(means: Readings, fit: Regression, noise: Sequence[float | None], risk
         n, c
     )
     own = np.eye(c) - np.einsum("nap,nbp->nab", *[Q[: n * c].reshape(n, c, -1)] * 2)
-    free = np.linalg.eigvalsh(own)[:, 0] > _SEEN
-    if len(means.times) < 3 or not free.any() or fit.noise_dof.max() < _FEW:
+    free = np.linalg.eigvalsh(own)[:, 0] > LIMITS.least_seen
+    if len(means.times) < 3 or not free.any() or fit.noise_dof.max() < LIMITS.fewest_degrees:
         return []
     score = np.full(n, -np.inf)
     score[free] = np.einsum("na,na->n", left[free], np.linalg.solve(own[free], left[free][..., None])[..., 0])
@@ -204,7 +188,9 @@ def _likely(
     tested.sort(key=lambda each: each.chance)
     # a heading that is wrong is a field to the ground too: of faults that explain about as much the simplest
     as_good = [
-        each for each in tested if np.log(each.chance + _TINY) < _SIMPLER * np.log(tested[0].chance + _TINY)
+        each
+        for each in tested
+        if np.log(each.chance + _TINY) < LIMITS.simpler_fault * np.log(tested[0].chance + _TINY)
     ]
     simplest = min(as_good, key=lambda each: len(each.values), default=None)
     return tested if simplest is None else [simplest, *(each for each in tested if each is not simplest)]
@@ -230,7 +216,7 @@ def _seen(fit: Regression, asked: Iterable[Fault], risk: float) -> tuple[list[Se
         size[size == 0.0] = 1.0
         left = beside(whole / size)
         _, s, vt = np.linalg.svd(left, full_matrices=False)
-        known = s > _SEEN
+        known = s > LIMITS.least_seen
         base = vt[known].T / s[known] / size[:, None]
         columns = beside(whole @ base)
         gain = np.einsum("nam,nab->mnb", columns[: n * c].reshape(n, c, -1), white.inverse)
@@ -247,13 +233,13 @@ def _reach(m: int, parts: Array, noise_dof: Array, risk: float) -> float:
     if not m:
         return math.inf
     nu = _dof(parts, noise_dof)
-    return math.sqrt(chdtri(m, risk) if nu > _MANY else m * fdtri(m, nu, 1.0 - risk))
+    return math.sqrt(chdtri(m, risk) if nu > LIMITS.known_variance else m * fdtri(m, nu, 1.0 - risk))
 
 
 def _dof(parts: Array, noise_dof: Array) -> float:
     """Degrees of freedom of a variance, by Welch and Satterthwaite: of each channel's noise, ``parts`` (c,) of the
     variance, those of ``noise_dof`` (c,)."""
-    return 1.0 / max(float(np.sum(np.square(parts) / noise_dof)), 1.0 / _MANY)
+    return 1.0 / max(float(np.sum(np.square(parts) / noise_dof)), 1.0 / LIMITS.known_variance)
 
 
 def _hypothesis(seen: Seen) -> Hypothesis[Array]:
@@ -291,5 +277,5 @@ def f_test(fit: Regression, noise: Sequence[float | None], seen: Seen) -> Tested
         for s, g in zip(now.noise, np.moveaxis(now.effect_gain[before:], -1, 0), strict=True)
     ]
     nu = _dof(np.array(parts), now.noise_dof)
-    chance = float(fdtrc(m, nu, statistic)) if nu < _MANY else float(chdtrc(m, m * statistic))
+    chance = float(fdtrc(m, nu, statistic)) if nu < LIMITS.known_variance else float(chdtrc(m, m * statistic))
     return TestedFault(seen, seen.base @ values, chance)

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.systems.turntable.limits import LIMITS
 
 SEED = 20261122
 """Of the draws: a record gives the same values each time."""
@@ -32,9 +33,6 @@ _DRAWS = 40_000
 
 _LEAST_ROOM = 1e-3
 """Of a part f of an interval f (1 - f), at least: the prior 1 / sqrt(f (1 - f)) has no upper end."""
-
-_OUTSIDE = 2
-"""Distinct inputs that are to lie beyond a dead zone on either side."""
 
 SYMBOLS = ("K0", "K1", "K_dz", "K_th", "K_hyst")
 """Terms of a test; the last one where inputs were both raised and lowered."""
@@ -204,7 +202,7 @@ class _Choice:
 def _pairs(levels: Array) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """All pairs of stretches between distinct inputs in which the two edges may lie."""
     stretches = list(zip(levels[:-1].tolist(), levels[1:].tolist(), strict=True))
-    inner = stretches[_OUTSIDE - 1 : len(stretches) - _OUTSIDE + 1]
+    inner = stretches[LIMITS.outside_zone - 1 : len(stretches) - LIMITS.outside_zone + 1]
     return [(one, other) for k, one in enumerate(inner) for other in inner[k:]]
 
 
@@ -249,7 +247,9 @@ def _choice(
         sigma,
         dof,
         volume + likelihood - (len(parts) - 1) * log(size),
-        bool(len(np.unique(x[below])) <= _OUTSIDE or len(np.unique(x[above])) <= _OUTSIDE),
+        bool(
+            len(np.unique(x[below])) <= LIMITS.outside_zone or len(np.unique(x[above])) <= LIMITS.outside_zone
+        ),
     )
 
 
