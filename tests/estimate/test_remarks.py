@@ -51,15 +51,14 @@ def test_only_what_has_no_uncertainty_is_taken_as_exact():
     ((code, text),) = texts(exact_gravity(Site(9.8), "K1 is off"))
     assert code == "stated_exact"
     assert text.startswith(
-        "gravity is taken as exactly 9.8 m/s^2, and K1 is off: state it with its uncertainty"
+        "gravity is taken as exactly 9.8 m/s^2, and K1 is off: State it with its uncertainty"
     )
     assert not exact_inputs({})
-    ((code, text),) = texts(exact_inputs({"heading": "2 deg of kg0_x", "latitude": "1 deg of ds_x"}))
-    assert code == "stated_exact"
-    assert text == (
-        "heading, latitude taken as exact: an error as large as one u of a coefficient comes from 2 deg of kg0_x, 1 "
-        "deg of ds_x; state them with uncertainties"
-    )
+    (found,) = exact_inputs({"heading": "2 deg of kg0_x", "latitude": "1 deg of ds_x"})
+    assert found.code == "stated_exact"
+    assert found.headline == "heading, latitude are taken as exact, and an error of each may be larger than u"
+    assert found.action == "State them with uncertainties."
+    assert found.table[1] == [("heading", "2 deg of kg0_x"), ("latitude", "1 deg of ds_x")]
 
 
 def test_the_site_rules_what_would_be_less_than_half_without_it():

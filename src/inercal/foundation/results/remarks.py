@@ -75,24 +75,22 @@ def exact_gravity(site: Site, effect: str) -> list[Finding]:
     """A finding where gravity has no uncertainty; ``effect`` says what becomes of an error of it."""
     if site.inputs:
         return []
-    text = (
-        f"gravity is taken as exactly {site.gravity:.7g} m/s^2, and {effect}: state it with its uncertainty, such as "
-        'gravity = "9.81(1) m/s^2", or the latitude and height in its place'
-    )
-    return [Finding("stated_exact", text)]
+    action = 'State it with its uncertainty, such as gravity = "9.81(1) m/s^2", or state latitude and height.'
+    headline = f"gravity is taken as exactly {site.gravity:.7g} m/s^2, and {effect}"
+    return [Finding("stated_exact", headline, action=action)]
 
 
 def exact_inputs(
-    harmful: Mapping[str, str], what: str = "taken as exact", cure: str = "state them with uncertainties"
+    harmful: Mapping[str, str],
+    what: str = "are taken as exact",
+    cure: str = "State them with uncertainties.",
 ) -> list[Finding]:
     """A finding where inputs have no uncertainty: of each the error that is as large as one u of a coefficient."""
     if not harmful:
         return []
-    text = (
-        f"{', '.join(harmful)} {what}: an error as large as one u of a coefficient comes from "
-        f"{', '.join(harmful.values())}; {cure}"
-    )
-    return [Finding("stated_exact", text)]
+    items = [{"input": name, "error as large as one u": error} for name, error in harmful.items()]
+    headline = f"{counted_names(list(harmful), 6)} {what}, and an error of each may be larger than u"
+    return [Finding("stated_exact", headline, action=cure, items=tuple(items))]
 
 
 def ruled_by_site(

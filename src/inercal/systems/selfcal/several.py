@@ -245,7 +245,7 @@ def _assembled(
         findings += [replace(f, headline=f"{part.name}: {f.headline}") for f in told]
     goal = reached(fit.names, uncertainty.u, settings.goal)
     findings += [*at_prior(judged.at_prior), *missed(goal, UNIT_OF)]
-    findings += exact_inputs(exact, cure="state them with uncertainties, or as states")
+    findings += exact_inputs(exact, cure="State them with uncertainties, or as states.")
     basis = studied(
         COMMAND,
         settings,

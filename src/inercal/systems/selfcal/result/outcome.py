@@ -144,7 +144,7 @@ def assemble(
         all_findings += missed(result["goal"], UNIT_OF, hints)
         all_findings += [Finding("at_prior", f"{name}: {why}") for name, (_, why) in hidden.items()]
         all_findings += exact_inputs(exact)
-        cure = "name them in states under [model], or state them with uncertainties"
+        cure = "Name them in states under [model], or state them with uncertainties."
         all_findings += exact_inputs(left_out, "are no states", cure)
         if rest is not None and rest.finding is not None:
             all_findings.append(rest.finding)
