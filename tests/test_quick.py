@@ -21,7 +21,7 @@ def test_the_nearest_tests_come_first_and_the_house_before_them():
     found = order("src/inercal/systems/aoa/paper/static.py")
     assert found[:3] == ["tests/test_architecture.py", "tests/laws", "tests/aoa/test_aoa_static.py"]
     # aoa's own, before those that run commands
-    assert found.index("tests/aoa/test_aoa_lever.py") < found.index("tests/cli/test_aoa_command.py")
+    assert found.index("tests/aoa/test_aoa_lever.py") < found.index("tests/cli/test_simulate_aoa.py")
     # another system does not hear of it but through the commands
     assert "tests/selfcal/test_batch.py" not in found
 

@@ -40,7 +40,7 @@ def secrets_of_old(monkeypatch):
     for module in (
         "foundation.results.files",
         "laboratory.keep",
-        "laboratory.supersede",
+        "laboratory.issue",
         "laboratory.certificate.written",
     ):
         monkeypatch.setattr(f"inercal.{module}.without_secrets", lambda given: given)

@@ -22,14 +22,14 @@ from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.considered import both
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
-from inercal.systems.selfcal.platform.plan import Plan, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Filter
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 
 found = {}
 for extended in (False, True):
-    settings = study(plan=Plan((Turn("z", 0.05), Turn("x", 0.05))), filter=Filter(extended=extended))
+    settings = study(plan=PlatformPlan((Turn("z", 0.05), Turn("x", 0.05))), filter=Filter(extended=extended))
     recording = simulate(experiment(settings), np.random.default_rng(4)).recording
     of = problem(settings)
     for kind in ("svd-qukf", "gimbal-ukf", "error-state"):

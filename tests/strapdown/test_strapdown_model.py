@@ -27,8 +27,9 @@ from inercal.systems.strapdown.model.coefficients import (
     slope,
     stated,
 )
+from inercal.systems.strapdown.model.delay import delayed
 from inercal.systems.strapdown.model.kernels import NodeState, shoot
-from inercal.systems.strapdown.model.samples import Samples, delayed, freed, gains
+from inercal.systems.strapdown.model.samples import Samples, freed, gains
 from inercal.systems.strapdown.settings import Motion
 from inercal.systems.strapdown.simulate import _turns, simulated, truth
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.systems.strapdown.model.samples import delayed
+from inercal.systems.strapdown.model.delay import delayed
 
 _HEAD = 50
 """Steps of time at the beginning of a record, whose median is the interval of its samples."""

@@ -23,7 +23,8 @@ from inercal.systems.strapdown.model.coefficients import (
     slope,
     stated,
 )
-from inercal.systems.strapdown.model.samples import Samples, delayed, freed
+from inercal.systems.strapdown.model.delay import delayed
+from inercal.systems.strapdown.model.samples import Samples, freed
 from inercal.systems.strapdown.settings import StrapdownSettings
 from inercal.systems.strapdown.task import StrapdownCalibration, calibrate
 
