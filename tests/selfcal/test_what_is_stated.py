@@ -16,8 +16,8 @@ from inercal.systems.selfcal.diagnosis.small import likely, small_errors
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.result.budget import stated_errors, systematic_inputs
 from inercal.systems.selfcal.result.outcome import assemble, verdict
-from inercal.systems.selfcal.result.systematic import stated_errors, systematic_inputs
 
 PLAIN = study(path="best")
 PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)

@@ -20,9 +20,9 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.result import budget as sources
+from inercal.systems.selfcal.result.budget import stated_errors
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.result.outcome import assemble
-from inercal.systems.selfcal.result.systematic import stated_errors
 from inercal.systems.selfcal.settings import Filter, Noise
 from inercal.systems.selfcal.task import calibrate
 

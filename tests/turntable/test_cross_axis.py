@@ -15,7 +15,7 @@ from inercal.foundation.records.record import record_of
 from inercal.foundation.rigs.distribution import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.rate.cross_axis import axis_about
+from inercal.systems.turntable.rate.several_axes import axis_about
 from inercal.systems.turntable.settings import RateTest
 from inercal.systems.turntable.task import calibrate
 

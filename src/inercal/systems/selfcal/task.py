@@ -27,9 +27,9 @@ from inercal.systems.selfcal.find_base import heading, is_rough, relative, with_
 from inercal.systems.selfcal.platform.coefficients import BETA
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.reading import as_recorded, recording_of
+from inercal.systems.selfcal.result.budget import stated_errors
 from inercal.systems.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.systems.selfcal.result.outcome import assemble, verdict
-from inercal.systems.selfcal.result.systematic import stated_errors
 from inercal.systems.selfcal.result.tables import of_attitudes, side_by_side
 from inercal.systems.selfcal.settings import SelfcalSettings
 from inercal.systems.selfcal.still_joints import still_joints, told_apart

@@ -30,10 +30,9 @@ from inercal.systems.selfcal.platform.coefficients import NAMES, product_slope, 
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
-from inercal.systems.selfcal.result.budget import considered, systematic, within
+from inercal.systems.selfcal.result.budget import considered, stated_errors, systematic, within
 from inercal.systems.selfcal.result.not_fitted import SOURCE as NOT_FITTED
 from inercal.systems.selfcal.result.not_fitted import not_fitted
-from inercal.systems.selfcal.result.systematic import stated_errors
 from inercal.systems.selfcal.settings import SelfcalSettings
 
 COMMAND = "selfcal"

@@ -26,8 +26,7 @@ from inercal.systems.turntable.model import FRAME, orthonormal
 from inercal.systems.turntable.positions.application import in_use
 from inercal.systems.turntable.positions.examination import examine
 from inercal.systems.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
-from inercal.systems.turntable.positions.latitude import of_latitude, stated_exact
-from inercal.systems.turntable.positions.shifts import Scale, doubts, findings_of
+from inercal.systems.turntable.positions.shifts import Scale, doubts, findings_of, of_latitude, stated_exact
 from inercal.systems.turntable.positions.tolerance import (
     alternatives,
     coefficient_shares,

@@ -18,12 +18,20 @@ from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate
 from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.rate.cross_axis import axis_about, excess_across, fit_across
 from inercal.systems.turntable.rate.ends import settled
 from inercal.systems.turntable.rate.fit import GyroRateFit, fit_rates, separable
 from inercal.systems.turntable.rate.linearity import SEED
 from inercal.systems.turntable.rate.outcome import assemble, unobservable
-from inercal.systems.turntable.rate.several_axes import LegStays, fit_axes, left_out, legs_of, unfit
+from inercal.systems.turntable.rate.several_axes import (
+    LegStays,
+    axis_about,
+    excess_across,
+    fit_across,
+    fit_axes,
+    left_out,
+    legs_of,
+    unfit,
+)
 from inercal.systems.turntable.rate.stays import Input, RateDwells, gyro_input, rate_dwells, turning_axis
 from inercal.systems.turntable.settings import TurntableSettings
 
