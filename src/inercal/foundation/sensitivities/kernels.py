@@ -38,9 +38,10 @@ FIXED, JOINT, ERROR = 0, 1, 2
 class Rig(NamedTuple):
     """A chain, its positions and outputs.
 
-    ``elements`` (m, 3), see `FIXED`; ``fixed`` (2, f, 3, 3) known rotations, and their transposes; ``errors`` (k, 5),
-    see `ERROR_ROW`, a column of the results each; ``angles`` (n, joints) [rad]; ``u`` (r, 3) and ``v`` (c, 3) distinct
-    references in the base frame and distinct axes of the instrument; ``outputs`` (o, 2) rows of u and v of each output.
+    ``elements`` (m, 3): for each its kind (`FIXED`, `JOINT`, `ERROR`) and its places; ``fixed`` (2, f, 3, 3) known
+    rotations, and their transposes; ``errors`` (k, 5), a row for each error, packed as `ERROR_ROW` says: error i gives
+    column i of the results; ``angles`` (n, joints) [rad]; ``u`` (r, 3) and ``v`` (c, 3) distinct references in the base
+    frame and distinct axes of the instrument; ``outputs`` (o, 2) rows of u and v of each output.
     """
 
     elements: Integers

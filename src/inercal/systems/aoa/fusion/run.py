@@ -67,8 +67,8 @@ class FilterStart(NamedTuple):
 
 
 class Head(NamedTuple):
-    """The state before a block of ``rows``, counted in the trace, after the fading ``F`` (n, n) of the constants there,
-    None where nothing fades: what a smoother goes back from."""
+    """The state at the start of a block, from which a smoother goes back: ``rows`` are those of the block in the trace,
+    ``F`` (n, n) the fading of the constants that is already in the state, None where nothing fades."""
 
     rows: slice
     belief: Belief

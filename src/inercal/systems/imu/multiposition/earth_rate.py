@@ -82,11 +82,12 @@ def vertical_output(verticals: Array, model: TriadModel, earth: EarthRate) -> Ar
 def unknown_rates(
     turns: Turns, verticals: Array, model: TriadModel, drift: Array, earth: EarthRate
 ) -> UnknownRates:
-    """Carry horizontal axes from the first pose through the turns, as far as these connect.
+    """How an unknown rate that is fixed to the Earth moves the verticals: carried from the first pose through turns that
+    connect.
 
     Notes
     -----
-    A rate h fixed to the Earth adds ``-h dt`` to every rotation vector, in the frame of the turn's start
+    n is the vertical, tau the duration of a turn from attitude R. A rate h fixed to the Earth adds ``-h dt`` to every rotation vector, in the frame of the turn's start
     ``-h tau`` in all, and so moves the carried vertical by ``-tau R^T (n x h)``.
     """
     R = whole_turns(increments(turns, model, drift))

@@ -112,9 +112,9 @@ def _from_start(ground: PathGround, rng: np.random.Generator) -> tuple[float, Se
 
 @dataclass(frozen=True, eq=False)
 class PathGround:
-    """The ground of a search: ``model`` plan without moves; ``low``, ``high`` (3,) limits as numbers of angles from the
-    start; ``number`` of angles that the time allows; ``coarse`` step [s] and ``problem`` with the noise of these; the
-    errors ``left_out`` that count, and what else limits the ``joints``."""
+    """The ground of a search: a plan without moves as ``model``; ``low`` and ``high`` (3,), limits of each joint in
+    steps of the angle from the start; the ``number`` of steps that the time allows; the interval ``coarse`` [s] of its
+    rows, and the ``problem`` with the noise of rows so far apart; the errors ``left_out`` that count in u."""
 
     asked: Search
     model: PlatformPlan

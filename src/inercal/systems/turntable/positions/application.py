@@ -15,7 +15,7 @@ from inercal.systems.turntable.settings import TurntableSettings
 
 
 def in_use(fit: Regression, slope: Array, settings: TurntableSettings, unit: str) -> dict[str, Any]:
-    """Keys of the result by which `inercal apply` makes the instrument.
+    """Keys of the result from which `inercal apply` rebuilds the instrument.
 
     Parameters
     ----------
