@@ -82,13 +82,13 @@ def vertical_output(verticals: Array, model: TriadModel, earth: EarthRate) -> Ar
 def unknown_rates(
     turns: Turns, verticals: Array, model: TriadModel, drift: Array, earth: EarthRate
 ) -> UnknownRates:
-    """How an unknown rate that is fixed to the Earth moves the verticals: carried from the first pose through turns that
-    connect.
+    """Carry the verticals from the first pose through turns that connect, with an unknown rate of the Earth.
 
     Notes
     -----
-    n is the vertical, tau the duration of a turn from attitude R. A rate h fixed to the Earth adds ``-h dt`` to every rotation vector, in the frame of the turn's start
-    ``-h tau`` in all, and so moves the carried vertical by ``-tau R^T (n x h)``.
+    n is the vertical, tau the duration of a turn from attitude R. A rate h fixed to the Earth adds ``-h dt`` to every
+    rotation vector, in the frame of the turn's start ``-h tau`` in all, and so moves the carried vertical
+    by ``-tau R^T (n x h)``.
     """
     R = whole_turns(increments(turns, model, drift))
     runs = [k for k in range(len(turns)) if k == 0 or turns.first[k] != turns.last[k - 1]]
