@@ -1,7 +1,4 @@
-"""``inercal examples``, ``schema`` and ``completion``: what comes with the package.
-
-``inercal validate``.
-"""
+"""``inercal examples``, ``schema``, ``completion`` and ``validate``: what comes with the package."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Certificates that were issued: each number once, in the chain of events.
 
-Supersession: a newer result takes the place of an older one.
+A newer result takes the place of an older one by supersession.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rows in safe pieces: files of some seconds each, every one whole or not there, so that a kill takes the last.
 
-Rows out: a line, its values, and these as quantities with unit and uncertainty.
+A row is a line, its values, and these as quantities with unit and uncertainty.
 """
 
 from __future__ import annotations

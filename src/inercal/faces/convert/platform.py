@@ -8,10 +8,7 @@ The platform turns at ``w_p = (1 + M) w + kg0`` where ``w`` is commanded
 of which the familiar ``w_p - M w_p - kg0`` is the first order: that leaves M (M w_p + kg0), at 1 deg/s and
 misalignments of 100 arcsec 0.001 deg/h, as much as a good calibration still sees, so the inverse is taken. Gyros that
 took the place of the commands are corrected the other way: ``w_p`` of the rate ``w`` they measured. What else the
-result has of rates, outputs and sag is corrected for too (`inercal.faces.convert.platform`); what is of angles,
-times and places is named.
-
-A platform beside its linear triads: what the table of states has at the rate, at the outputs, and sag.
+result has of rates, outputs and sag is corrected for too; what is of angles, times and places is named.
 
 With f the specific force in p, w the rate commanded or measured, T kelvins above the temperature of the coefficients
 (`inercal.systems.selfcal.platform.model`):

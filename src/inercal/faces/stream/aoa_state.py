@@ -1,7 +1,4 @@
-"""State of a stream of angles of attack between two rows.
-
-Sensors of a model on a stream: a row of the record to measured values, and what is said of them.
-"""
+"""State of a stream of angles of attack between two rows, and its sensors: a row of the record to measured values."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ References: NIMA TR8350.2, third edition, amendment 1 (2000), "Department of Def
 Real gravity differs from the normal gravity given here by up to some 1e-3 m/s², in most places by less than
 5e-4 m/s².
 
-A place with known gravity, and what that value is uncertain by.
+A `Site` is a place with known gravity, and what that value is uncertain by.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The noise of an instrument at rest: a record's Allan deviations and noise coefficients as an estimate.
 
-Was the instrument at rest: pieces of a recording in which a channel is far more restless than in its calm ones.
+Pieces of a recording in which a channel is far more restless than in its calm ones are told: there it did not rest.
 """
 
 from __future__ import annotations

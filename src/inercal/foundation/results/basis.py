@@ -1,6 +1,6 @@
 """Basis of a result beside its numbers: command, model, conditions, files, versions, publications.
 
-A model as it is stated: words, and its mathematics in LaTeX between dollars, of which the plain text follows.
+A `Formula` is a model as it is stated: words, and mathematics in LaTeX between dollars; plain text follows from it.
 
 ``$y = S M f + b$, $b = K_0$`` is ``y = S M f + b, b = K0`` in plain text. What is written between dollars keeps to
 letters, numbers, operators, brackets, ``_``, ``^``, ``\\,``, names as ``\tau``, ``\\mathrm`` and ``bmatrix``.

@@ -1,8 +1,7 @@
 """An estimate in the units and words that people use; everything behind it stays in SI.
 
-Numbers as texts: rounded to their uncertainty, or short where they have none.
-
-A small table of texts: printed by a command, and shown on a page.
+Numbers become texts that are rounded to their uncertainty, or short where they have none. A `Table` of texts is
+printed by a command, and shown on a page.
 """
 
 from __future__ import annotations

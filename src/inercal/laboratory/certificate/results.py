@@ -1,6 +1,6 @@
 """Measurement results of a certificate: method, equipment, conditions, coefficients, covariance, files.
 
-Statements of conformity: which coefficients are within their tolerances, by the rule that the laboratory states.
+Conformity is stated with them: which coefficients are within their tolerances, by the rule of the laboratory.
 """
 
 from __future__ import annotations

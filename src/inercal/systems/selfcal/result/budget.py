@@ -3,7 +3,7 @@
 The covariance of a filter is split as that of the bounds along its path is; systematic inputs (type B) act through the
 error-state filter, run again with each changed by one standard uncertainty either way.
 
-Systematic inputs of site and base: latitude, gravity, heading, tilt, each with its uncertainty and its effect.
+Latitude, gravity, heading and tilt are such inputs, each with its uncertainty and its effect.
 """
 
 from __future__ import annotations

@@ -9,12 +9,11 @@ Its slope by s_j is sum tr(M_k Q_kj) - r_k^T W Q_kj W r_k with the residuals r a
 is the covariance of what the solution says of the interval; its curvature is taken from the intervals alone (Fisher's
 scoring), which only costs steps.
 
-Coefficients averaged over the sizes that noise may have which was found from a recording.
+What the recording leaves open of the size of a noise counts in u.
 
 A walk of biases that hardly shows may be found as next to nothing, and u that believes it is too small. Given the size
-of a noise, the last linear problem of a fit has the likelihood of that size
-(`inercal.systems.strapdown.noise.restricted`), with the coefficients c and their covariance P. Beforehand all sizes
-(standard deviations) are alike. The second moment about the values of the fit,
+of a noise, the last linear problem of a fit has the likelihood of that size, with the coefficients c and their
+covariance P. Beforehand all sizes (standard deviations) are alike. The second moment about the values of the fit,
 
     E[P + (c - c_fit) (c - c_fit)^T]
 
