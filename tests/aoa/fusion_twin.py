@@ -168,7 +168,7 @@ def beyond(twin, P, believed):
 
 
 def run(twin, start, t, rows):
-    """Filter and smoother from a `Start`: arrays of states (m, n) and covariances (m, n, n), causal and smoothed.
+    """Filter and smoother from a `FilterStart`: arrays of states (m, n) and covariances (m, n, n), causal and smoothed.
 
     The innovations over their standard deviations (m, N + 1) come last.
     """

@@ -23,6 +23,6 @@ In Python, for a page or a program of one's own::
 
 What ``latest`` holds goes by the study: of kind aoa ``theta`` with u, ``rate``, ``nis``, ``status``; of selfcal
 attitude and each coefficient with u; of strapdown the number of rests and each coefficient with u; of imu ``rest``,
-``still``, means and noise of each channel. All of it may be asked from any thread. `Measurement` itself takes a `Plan`,
-for other estimators, a checkpoint, and functions that are told at once what happens.
+``still``, means and noise of each channel. All of it may be asked from any thread. `RunningMeasurement` itself
+takes a `MeasurementPlan`, for other estimators, a checkpoint, and functions that are told at once what happens.
 """

@@ -1,8 +1,7 @@
 """The workbench for programs of a laboratory: sessions, jobs and results over HTTP, under ``/api/v1``.
 
-Every request carries the key as ``Authorization: Bearer KEY``. Described by ``/api/v1/openapi.json``.
-
-Measurements by wire for programs: begun, looked at and stopped over HTTP.
+Every request carries the key as ``Authorization: Bearer KEY``. Described by ``/api/v1/openapi.json``. Measurements by
+wire are begun, looked at and stopped here, too.
 """
 
 from __future__ import annotations

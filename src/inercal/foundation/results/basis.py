@@ -3,7 +3,7 @@
 A `Formula` is a model as it is stated: words, and mathematics in LaTeX between dollars; plain text follows from it.
 
 ``$y = S M f + b$, $b = K_0$`` is ``y = S M f + b, b = K0`` in plain text. What is written between dollars keeps to
-letters, numbers, operators, brackets, ``_``, ``^``, ``\\,``, names as ``\tau``, ``\\mathrm`` and ``bmatrix``.
+letters, numbers, operators, brackets, ``_``, ``^``, ``\\,``, names as ``\\tau``, ``\\mathrm`` and ``bmatrix``.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """A recording of a wind-tunnel model for the estimators: in SI, calibrated, on one clock, NaN where samples lack.
 
-Stretches that a trigger channel marks: a level that holds over a point, or a pulse or count at which one begins.
-
-Uncertainty of a mean of rows that are correlated, often negatively: noise, buffet, an oscillation cut off.
-
-It is found from the spectrum near zero: with the lowest K cosines of n rows,
+Of its stretches that a trigger channel marks, a level holds over a point, or a pulse or count begins one. Means are
+over rows that are correlated, often negatively: noise, buffet, an oscillation cut off. Their uncertainty is found from
+the spectrum near zero: with the lowest K cosines of n rows,
 
     L_k = sqrt(2/n) sum_i x_i cos(pi k (i + 1/2) / n),   var(mean) = (1/n) (1/K) sum_k L_k^2,
 
@@ -12,8 +10,6 @@ K = 8 degrees of freedom. For white noise that is s^2/n, for noise of correlatio
 rows (c < T / pi K) s^2 2c/T, and for an oscillation, whose mean is all but zero over whole periods, twice the variance
 that its cut periods leave. Source: Lazarus, Lewis, Stock and Watson 2018, "HAR inference: recommendations for
 practice", J. Business and Economic Statistics 36(4) (equally weighted cosines).
-
-Rows that go on in time, gaps of time, and the step of an even grid.
 """
 
 from __future__ import annotations

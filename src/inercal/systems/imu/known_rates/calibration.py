@@ -1,10 +1,8 @@
 """A gyro at known rates in unknown orientations: one record for each rate in, an estimate out.
 
-An orientation that lies off all others: found, and named with what it does to the coefficients.
-
-Changes over the orientations: a bias that drifts, or a rate or scale factor that does, looked for in the residuals.
-
-Times are no part of rows of means, so that a trend goes with the number of the orientation, file after file.
+An orientation that lies off all others is named, with what it does to the coefficients. A bias, a rate or a scale
+factor that drifts over the orientations is looked for in the residuals; times are no part of rows of means, so that a
+trend goes with the number of the orientation, file after file.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def columns(names: Sequence[str]) -> list[tuple[str, str]]:
 def rows(
     attitude: Array, attitude_u: Array, coefficients: Array, u: Array, near: Array, world: World
 ) -> Array:
-    """All columns but the last two, (n, 10 + 2 p), of a `History` or `Estimates` of n rows.
+    """All columns but the last two, (n, 10 + 2 p), of a `RowHistory` or `Estimates` of n rows.
 
     ``near`` (3,) [rad] are gimbal angles shortly before the first row.
     """
