@@ -304,18 +304,16 @@ def reference_types() -> str:
 
 
 def limits() -> str:
-    """The limits of every system that has them, a table for each."""
-    import inercal
+    """The limits of every system, and of rooms in it that have their own, a table for each."""
+    from inercal import systems
 
     parts = []
-    package = Path(inercal.__file__).parent
-    found = [*package.glob("*/limits.py"), *package.glob("*/*/limits.py")]
-    for path in sorted(found, key=lambda path: path.parent.name):
-        name = ".".join(path.relative_to(package).with_suffix("").parts)
-        module = import_module(f"inercal.{name}")
+    for path in sorted(Path(systems.__file__).parent.rglob("limits.py")):
+        room = ".".join(path.parent.relative_to(Path(systems.__file__).parent).parts)
+        module = import_module(f"inercal.systems.{room}.limits")
         meanings = _meanings(path.read_text(encoding="utf-8"), type(module.LIMITS).__name__)
         rows = [(code(name), *_value(value, meanings[name])) for name, value in vars(module.LIMITS).items()]
-        parts.append(f"## {path.parent.name}\n\n" + table(("limit", "value", "meaning"), rows))
+        parts.append(f"## {room}\n\n" + table(("limit", "value", "meaning"), rows))
     return "\n\n".join(parts)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from sting_study import DEG, NOISE, layout
 
-from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.lever import oscillation_frequency
+from inercal.systems.aoa.paper.limits import LIMITS
 
 THREE = layout()
 

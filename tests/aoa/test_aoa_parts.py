@@ -9,8 +9,7 @@ from sting_study import DEG
 from inercal.foundation.arrays import remembered
 from inercal.systems.aoa.angles import unwrapped
 from inercal.systems.aoa.paper.delay import _moved
-from inercal.systems.aoa.reading import pauses
-from inercal.systems.aoa.reading import recording as clock
+from inercal.systems.aoa.reading import pauses, recording
 from inercal.systems.aoa.reading.recording import in_time, later, plain
 from rows import for_each
 
@@ -29,7 +28,7 @@ from rows import for_each
     ],
 )
 def test_rows_that_go_on_in_time_are_those_later_than_all_before(monkeypatch, t):
-    monkeypatch.setattr(clock, "_PART", 3)
+    monkeypatch.setattr(recording, "_PART", 3)
     t, highest, expected = np.array(t), -np.inf, []
     for row, stamp in enumerate(t.tolist()):
         if stamp > highest:

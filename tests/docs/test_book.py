@@ -17,6 +17,7 @@ from inercal.foundation.findings import CODES
 from inercal.foundation.instruments.terms import NOISE_TERMS, TERMS
 from inercal.foundation.records.channels import _EXAMPLES
 from inercal.systems.aoa import limits as aoa
+from inercal.systems.aoa.paper import limits as paper
 from inercal.systems.imu import limits as imu
 from inercal.systems.selfcal import limits as selfcal
 from inercal.systems.strapdown import limits as strapdown
@@ -189,7 +190,7 @@ def test_the_reference_has_every_command_term_code_channel_and_limit(book):
         "records": [f">{name}</span>" for name in _EXAMPLES if not re.fullmatch(r"a[34]", name)],
         "limits": [
             f">{name}</span>"
-            for module in (aoa, imu, selfcal, strapdown, turntable)
+            for module in (aoa, paper, imu, selfcal, strapdown, turntable)
             for name in vars(module.LIMITS)
         ],
     }

@@ -56,7 +56,10 @@ def test_only_what_has_no_uncertainty_is_taken_as_exact():
     assert not exact_inputs({})
     (found,) = exact_inputs({"heading": "2 deg of kg0_x", "latitude": "1 deg of ds_x"})
     assert found.code == "stated_exact"
-    assert found.headline == "heading, latitude are taken as exact, and an error of each may be larger than u"
+    assert (
+        found.headline
+        == "heading, latitude are taken as exact, and the errors listed shift a coefficient by its u"
+    )
     assert found.action == "State them with uncertainties."
     assert found.table[1] == [("heading", "2 deg of kg0_x"), ("latitude", "1 deg of ds_x")]
 

@@ -16,6 +16,7 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from simulated import of_user
 
+from inercal.bench.workbench.pages.frame import _PLACES
 from inercal.bench.workbench.pages.run import part_of
 
 
@@ -64,6 +65,14 @@ async def test_home_opens_every_example_in_one_click(user, bench):
         if each.props.get("aria-label", "").startswith("open example")
     ]
     assert sorted(opens) == sorted(f"open example {name}" for name in EXAMPLES)
+
+
+@of_user
+async def test_a_page_has_the_title_of_the_way_to_it(user, bench):
+    """By which its way is marked as the current one."""
+    for target, words in _PLACES:
+        await user.open(target)
+        assert user.client.title == f"{words} - inercal"
 
 
 @of_user

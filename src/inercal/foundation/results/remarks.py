@@ -89,7 +89,7 @@ def exact_inputs(
     if not harmful:
         return []
     items = [{"input": name, "error as large as one u": error} for name, error in harmful.items()]
-    headline = f"{counted_names(list(harmful), 6)} {what}, and an error of each may be larger than u"
+    headline = f"{counted_names(list(harmful), 6)} {what}, and the errors listed shift a coefficient by its u"
     return [Finding("stated_exact", headline, action=cure, items=tuple(items))]
 
 

@@ -56,7 +56,7 @@ def add(bench: Bench) -> None:
                 session = bench.by_wire(kind)
                 ui.navigate.to(f"/sessions/{session.id}/study")
 
-        with framed("WishedMeasurement"):
+        with framed("Live"):
             heading("At work")
             going_on = bench.measurements.at_work
             if not going_on:

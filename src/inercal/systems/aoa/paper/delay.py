@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.systems.aoa.layout import Layout, all_weights, centrifugal_arms
-from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.paper.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, in_time, later, shortened, usual_step
 
 _STEP = 2e-4

@@ -25,7 +25,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.systems.aoa.estimators import Centrifugal
 from inercal.systems.aoa.layout import Layout, all_weights, centrifugal_arms, pair_weights, tangential_arms
-from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.paper.limits import LIMITS
 from inercal.systems.aoa.paper.residuals import DECISION
 from inercal.systems.aoa.reading.recording import shortened, usual_step
 
