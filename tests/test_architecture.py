@@ -299,8 +299,8 @@ def test_modules_can_be_read_in_one_go():
 CEILINGS = {
     "names used across folders": 1440,
     "class names shared": 5,
-    "constants outside Limits": 440,
-    "modules": 629,
+    "constants outside Limits": 444,
+    "modules": 634,
 }
 
 

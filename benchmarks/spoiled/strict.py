@@ -213,6 +213,56 @@ def tdms(data):
     )
 
 
+def xlsx(data):
+    """ZIP checks the sums of its members; the cells by another library."""
+    import openpyxl
+
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        must(archive.testzip() is None)
+    first, *rows = openpyxl.load_workbook(io.BytesIO(data), data_only=True).active.values
+    return named(dict(zip(first, np.array(rows, float).T, strict=True)))
+
+
+def dataflash(data):
+    """One message after the other, of two kinds: https://ardupilot.org/dev/docs/code-overview-adding-a-new-log-message.html."""
+    must(data[:5] == b"\xa3\x95\x80\x80\x59")
+    at, rows, wanted = 0, [], b"IMU\0" + b"Qdd".ljust(16, b"\0") + b"TimeUS,acc_x,gyro_x".ljust(64, b"\0")
+    while at < len(data):
+        must(data[at : at + 2] == b"\xa3\x95" and data[at + 2] in (128, 10))
+        if data[at + 2] == 128:
+            must(at == 0 or (data[at + 3 : at + 5] == b"\x0a\x1b" and data[at + 5 : at + 89] == wanted))
+            at += 89
+        else:
+            rows.append(struct.unpack_from("<Qdd", data, at + 3))
+            at += 27
+    t, acc, gyro = np.array(rows).T
+    return {"t": 1e-6 * t, "acc_x": acc, "gyro_x": gyro}
+
+
+def ulog(data):
+    """Header, one format, one subscription, data: https://docs.px4.io/main/en/dev_log/ulog_file_format.html."""
+    must(data[:7] == b"ULog\x01\x12\x35")
+    at, rows, kinds = 16, [], []
+    while at < len(data):
+        size, kind = struct.unpack_from("<Hc", data, at)
+        body = data[at + 3 : at + 3 + size]
+        must(len(body) == size)
+        kinds.append(kind)
+        if kind == b"F":
+            must(body == b"imu:uint64_t timestamp;double acc_x;double gyro_x;")
+        elif kind == b"A":
+            must(body == b"\0\0\0imu")
+        elif kind == b"D":
+            must(size == 26 and body[:2] == b"\0\0")
+            rows.append(struct.unpack_from("<Qdd", body, 2))
+        else:
+            must(kind == b"B" and not any(body))
+        at += 3 + size
+    must(b"".join(kinds).startswith(b"BFAD") and {*kinds[3:]} == {b"D"})
+    t, acc, gyro = np.array(rows).T
+    return {"t": 1e-6 * t, "acc_x": acc, "gyro_x": gyro}
+
+
 def bag(path):
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -247,6 +297,15 @@ def columns(name, path):
                 return lines(gzip.decompress(data) if name == "csv.gz" else data)
             case "csv, decimal commas":
                 return lines(data, ";", ",")
+            case "csv, UTF-16":
+                must(data.startswith(b"\xff\xfe"))
+                return lines(data[2:].decode("utf-16-le").encode())
+            case "xlsx":
+                return xlsx(data)
+            case "dataflash":
+                return dataflash(data)
+            case "ulog":
+                return ulog(data)
             case "text, blanks":
                 return blanks(data)
             case "text on its side":

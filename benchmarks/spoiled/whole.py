@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from . import dataflash_log, ulog_file
+
 T = np.arange(60) / 100
 RNG = np.random.default_rng(20261122)
 VALUES = {"acc_x": 9.8 + RNG.standard_normal(60).round(4), "gyro_x": RNG.standard_normal(60).round(4)}
@@ -161,6 +163,38 @@ def daqmx():
     return lead + meta + counts
 
 
+def xlsx():
+    """A sheet as Excel has it."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    for row in [HEADER.split(","), *table().tolist()]:
+        book.active.append(row)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    return buffer.getvalue()
+
+
+def stamped():
+    """Rows with stamps in microseconds."""
+    return [(round(1e6 * t), *row) for t, *row in table().tolist()]
+
+
+def dataflash():
+    """A log of ArduPilot with one message of data."""
+    parts = [
+        dataflash_log.declared(128, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns"),
+        dataflash_log.declared(10, "IMU", "Qdd", "TimeUS,acc_x,gyro_x"),
+    ]
+    return b"".join([*parts, *(dataflash_log.message(10, "Qdd", *row) for row in stamped())])
+
+
+def ulog():
+    """A file of PX4 with one topic."""
+    fields = (("uint64_t", "timestamp"), ("double", "acc_x"), ("double", "gyro_x"))
+    return ulog_file.log([("imu", 0, fields, stamped())])
+
+
 def bag(kind):
     """ROS 1, or ROS 2 in a database or MCAP: 60 messages of sensor_msgs/Imu."""
     from rosbags import rosbag1, rosbag2
@@ -265,6 +299,7 @@ FORMATS = {
     "csv, decimal commas": (".csv", lambda: text(";", ","), None),
     "csv.gz": (".csv.gz", lambda: gzip.compress(text(), mtime=0), None),
     "text, blanks": (".txt", lambda: text(" "), None),
+    "csv, UTF-16": (".csv", lambda: text().decode().encode("utf-16"), None),
     "text on its side": (
         ".txt",
         lambda: "".join(
@@ -286,6 +321,9 @@ FORMATS = {
     "parquet": (".parquet", lambda: written(".parquet"), None),
     "tdms": (".tdms", tdms, None),
     "tdms, DAQmx": (".tdms", daqmx, DAQ),
+    "xlsx": (".xlsx", xlsx, None),
+    "dataflash": (".bin", dataflash, MAP.replace('from = "t", unit = "s"', 'from = "TimeUS", unit = "us"')),
+    "ulog": (".ulg", ulog, MAP.replace('from = "t", unit = "s"', 'from = "imu/timestamp", unit = "us"')),
     "bag": (".bag", lambda: bag("bag"), None),
     "db3": (".db3", lambda: bag("db3"), None),
     "mcap": (".mcap", lambda: bag("mcap"), None),

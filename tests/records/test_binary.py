@@ -80,7 +80,7 @@ def test_what_is_too_short_or_missing_is_refused(tmp_path):
     (tmp_path / "log.bin").write_bytes(b"1234")
     with pytest.raises(RecordError, match="found 4 bytes, expected rows of 12 bytes"):
         read(tmp_path / "log.bin", where)
-    with pytest.raises(InputError, match="a raw binary file needs a map"):
+    with pytest.raises(InputError, match="say its frames in a map"):
         read(tmp_path / "log.bin")
 
 

@@ -1,5 +1,6 @@
 """MAT files, the shipped Xsens recording among them."""
 
+import struct
 import warnings
 from importlib.resources import files
 from pathlib import Path
@@ -10,6 +11,7 @@ import scipy.io
 from scipy.io import savemat
 
 from inercal.foundation.errors import MapError, RecordError
+from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import mat, read
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
@@ -147,3 +149,45 @@ def test_what_scipy_reads_has_parts_that_fit():
         mat._check_structure(path)
         taken += 1
     assert taken > 80
+
+
+def element(kind, data):
+    """An element of a MAT file of version 5: a tag and the data, filled up to eight bytes."""
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+@pytest.mark.parametrize(("kind", "writer"), [("timetable", "writetimetable"), ("table", "writetable")])
+def test_a_timetable_says_how_matlab_writes_it(tmp_path, kind, writer):
+    """An opaque object (class 17), as MATLAB saves a timetable: name, type system, class, reference."""
+    reference = element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, b"")
+    reference += element(6, struct.pack("<I", 7))
+    parts = [
+        element(6, struct.pack("<II", 17, 0)),
+        element(1, b"imu"),
+        element(1, b"MCOS"),
+        element(1, kind.encode()),
+    ]
+    body = b"".join(parts) + element(14, reference)
+    path = tmp_path / "imu.mat"
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + element(14, body))
+    with pytest.raises(RecordError, match=rf"'imu' is a MATLAB {kind}.*run {writer}\(imu, 'imu.csv'\)"):
+        guess_map(path)
+
+
+@pytest.mark.parametrize("channels", [3, 7])
+def test_arrays_that_lie_on_their_side_are_guessed_so(tmp_path, channels):
+    """Channels in rows, as MATLAB users write them: the map says so, and reads the same values."""
+    gyro = np.random.default_rng(1).standard_normal((channels - 3, 400))
+    acc = np.array([[0.3], [-0.2], [9.8]]) + 0.01 * np.random.default_rng(2).standard_normal((3, 400))
+    path = saved(tmp_path / "m.mat", t=np.arange(400) / 100, acc=acc, other=np.vstack([acc, gyro]))
+    text = guess_map(path)
+    assert "transpose = true" in text
+    record_map = tmp_path / "map.toml"
+    record_map.write_text(text)
+    np.testing.assert_array_equal(read(path, record_map).triad("acc").values, acc.T)
+
+
+@pytest.mark.parametrize("rows", [30, 60, 400])
+def test_an_array_of_rows_is_left_as_it_is(tmp_path, rows):
+    path = saved(tmp_path / "m.mat", acc=9.8 + np.random.default_rng(2).standard_normal((rows, 20)))
+    assert "transpose" not in guess_map(path)

@@ -42,6 +42,7 @@ class _File:
     guesses: Mapping[str, Guess]
     leading: tuple[str, ...]
     unused: tuple[str, ...] = ()
+    transposed: bool = False
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -119,12 +120,13 @@ def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
-    files = [_File(path, longest, leading)]
+    lying = any(sample.options.transpose for sample in samples)
+    files = [_File(path, longest, leading, transposed=lying)]
     for guesses in others:
         guessed = {name for file in files for name in file.guesses} - {"t"}
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
         if "t" in new and len(new) > 1:
-            files.append(_File(path, new, ()))
+            files.append(_File(path, new, (), transposed=lying))
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
@@ -293,9 +295,16 @@ def _columns(file: _File, table: str) -> list[str]:
 
 def _options(file: _File, table: str) -> list[str]:
     """The layout of a file as TOML, as far as it is not found out on reading."""
-    if not file.leading:
+    lines = []
+    if file.leading:
+        lines += [
+            f"skip = {len(file.leading)}",
+            f"# the first of these lines is {quoted(file.leading[0][:60])}",
+        ]
+    if file.transposed:
+        lines += ["# channels are rows", "transpose = true"]
+    if not lines:
         return []
-    lines = [f"skip = {len(file.leading)}", f"# the first of these lines is {quoted(file.leading[0][:60])}"]
     return ["", f"[{table}]", *lines] if table else lines
 
 

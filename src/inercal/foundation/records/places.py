@@ -22,7 +22,8 @@ def counted_names(names: Sequence[str], most: int = 5) -> str:
 
 
 def shortened(name: str, most: int = 80) -> str:
-    """A name of a file's own, at most so many characters of it."""
+    """A name of a file's own, at most so many characters of it; what is not printable, such as a line end, is a �."""
+    name = "".join(character if character.isprintable() else "\ufffd" for character in name[: 2 * most])
     return name if len(name) <= most else f"{name[: most - 3]}..."
 
 

@@ -18,8 +18,8 @@ _TITLE = re.compile(r"(\w+)\s*(?:\[(.*)\])?")
 
 
 def bare(title: str) -> str:
-    """A title without the unit in brackets, square or round, behind it."""
-    return re.sub(r"(?<=\S)\s*[\[(].*", "", title).strip()
+    """A title without the unit in brackets, square or round, behind it; a number there is no unit but an index."""
+    return re.sub(r"(?<=\S)\s*[\[(](?!\d+[\])]).*", "", title).strip()
 
 
 def name_and_unit(title: str) -> tuple[str, str | None]:
@@ -123,7 +123,7 @@ def titled(title: str, given: str | None = None) -> tuple[str | None, str | None
     """
     if len(title) > TITLE:
         return None, None
-    match = re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", title.strip())
+    match = re.fullmatch(r"(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])])?", title.strip())
     plain, unit = (match[1], match[2] or given) if match else (title, given)
     name = _named(plain)
     if unit is None:
@@ -230,4 +230,5 @@ def _words(title: str) -> str:
     """A name as words in small letters."""
     # uT is no u and t
     words = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Za-z][a-z])(?=[A-Z])", " ", title)
+    words = re.sub(r"\[([012])\]", lambda index: f" {'xyz'[int(index[1])]}", words)
     return re.sub(r"[^a-z0-9]+", " ", words.lower()).strip()

@@ -15,6 +15,7 @@ from inercal.foundation.errors import InputError, MapError, RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.checks import check
+from inercal.foundation.records.read.content import format_by_content
 from inercal.foundation.records.read.join import FileTable, joined
 from inercal.foundation.records.read.limits import size_of
 from inercal.foundation.records.read.table import FileShare, Format, Reader
@@ -38,6 +39,9 @@ FORMATS = {
     ".npz": "npz",
     ".parquet": "parquet",
     ".tdms": "tdms",
+    ".ulg": "ulog",
+    ".bin": "dataflash",
+    **dict.fromkeys((".xlsx", ".xlsm", ".xls", ".ods"), "sheets"),
     **dict.fromkeys((".bag", ".mcap", ".db3"), "bags"),
 }
 
@@ -283,7 +287,7 @@ def _form(path: Path, part: FileShare) -> Reader:
 
 
 def format_of(path: Path) -> Format:
-    """The module that reads a file; raises `RecordError` if there is no such file or none reads its suffix."""
+    """The module that reads a file, by its ending, else by its content; raises `RecordError` if there is none."""
     if (path / "metadata.yaml").is_file():
         return _module("bags")
     name = path.name.lower()
@@ -298,12 +302,11 @@ def format_of(path: Path) -> Format:
         raise RecordError(
             path, "is a folder without metadata.yaml (a ROS 2 bag has one), expected a recording"
         )
-    ending = "".join(Path(name).suffixes[-2:]) if name.endswith(".gz") else Path(name).suffix
-    raise RecordError(
-        path,
-        f"found the ending {ending or 'none'!r}, expected one of {', '.join(FORMATS)}; a raw binary "
-        "file needs a map with `binary` and `fields` under [file]",
-    )
+    if not path.is_file():
+        raise RecordError(
+            path, f"found {'a pipe or a device' if is_pipe(path) else 'no such file'}, expected a recording"
+        )
+    return _module(format_by_content(path))
 
 
 def _module(name: str) -> Format:

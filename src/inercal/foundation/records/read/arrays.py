@@ -23,13 +23,15 @@ from inercal.foundation.records.checks import missing, too_long
 from inercal.foundation.records.places import counted_names, shortened
 from inercal.foundation.records.read.child import Tell, Work, in_child
 from inercal.foundation.records.read.limits import FIELDS, check_unpacked, memory, size_of
-from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
+from inercal.foundation.records.read.table import FileOptions, FirstLook, RawTable
+from inercal.foundation.records.read.values import numbers, rounded, texts
 from inercal.foundation.records.titles import bare, canonical
 from inercal.foundation.units import parse_unit
 
 T = TypeVar("T")
 
 _LISTED = 20
+_MOST_CHANNELS, _LONGER = 12, 20  # of an array whose rows are channels, and how many times longer they are
 
 
 @dataclass(frozen=True)
@@ -227,14 +229,22 @@ def tables(
     if not groups:
         return [RawTable((), {}, contents.words, 0, (), contents.findings)]
     parts = [_table(contents, group, clock, path) for clock, group in groups.items()]
-    numbers = (column for part in parts for column in (*part.values.values(), part.clock))
-    if all(column is None or np.isnan(column).all() for column in numbers):
+    read = (column for part in parts for column in (*part.values.values(), part.clock))
+    if all(column is None or np.isnan(column).all() for column in read):
         raise RecordError(path, "no row of numbers in the mapped columns, expected numbers")
     return parts
 
 
 def samples(contents: Contents, path: Path) -> list[FirstLook]:
-    """A first look at the arrays of a file: single columns by length, with their names, and each table."""
+    """A first look at the arrays of a file: single columns by length, with their names, and each table.
+
+    Where all tables lie on their side, they are looked at as `transposed`, and the options say so.
+    """
+    tables_held = [array for array in contents.arrays.values() if array.columns > 1 and not array.text]
+    lying = bool(tables_held) and not contents.tabular and all(map(_lies_on_its_side, tables_held))
+    if lying:
+        contents = transposed(contents, path)
+    options = FileOptions(transpose=lying)
     arrays = {name: array for name, array in islice(contents.arrays.items(), FIELDS) if array.rows > 1}
     check_unpacked(path, sum(8 * each.rows * each.columns for each in arrays.values()), size_of(path))
     looks = []
@@ -242,15 +252,20 @@ def samples(contents: Contents, path: Path) -> list[FirstLook]:
         single = {name: each for name, each in arrays.items() if each.columns == 1 and each.rows == rows}
         if single:
             values = np.column_stack(
-                [np.full(rows, np.nan) if each.text else _numbers(each.load(0)) for each in single.values()]
+                [np.full(rows, np.nan) if each.text else numbers(each.load(0)) for each in single.values()]
             )
             units = tuple(each.unit for each in single.values())
-            looks.append(FirstLook(values, tuple(single), FileOptions(), units=units))
+            looks.append(FirstLook(values, tuple(single), options, units=units))
     for name, array in arrays.items():
         if array.columns > 1 and not array.text:
-            values = np.column_stack([_numbers(array.load(column)) for column in range(array.columns)])
-            looks.append(FirstLook(values, (), FileOptions(), name))
+            values = np.column_stack([numbers(array.load(column)) for column in range(array.columns)])
+            looks.append(FirstLook(values, (), options, name))
     return looks
+
+
+def _lies_on_its_side(array: NamedArray) -> bool:
+    """True for a few rows that are much longer than they are many: channels, not samples."""
+    return 2 <= array.rows <= _MOST_CHANNELS and array.columns > _LONGER * array.rows
 
 
 def _clocks(
@@ -285,14 +300,14 @@ def _table(
         array = contents.arrays[name]
         rows[channel.name] = len(loaded)
         if channel.name == "label":
-            labels = _texts(loaded)
+            labels = texts(loaded)
             continue
         if array.text:
             raise RecordError(path, f"{name} holds text, expected numbers for {channel.name}")
         if loaded.dtype.kind in "Mm" and channel.unit.symbol != "s":
             raise RecordError(path, f'{name} holds dates, which are read in seconds, expected unit = "s"')
-        values[channel.name] = _numbers(loaded)
-        if channel.name != "t" and (beyond := _rounded(loaded)).size:
+        values[channel.name] = numbers(loaded)
+        if channel.name != "t" and (beyond := rounded(loaded)).size:
             long.append(too_long(channel.name, "row", beyond + 1))
     if len(set(rows.values())) > 1:
         counts = ", ".join(f"{count} rows of {name}" for name, count in rows.items())
@@ -302,7 +317,7 @@ def _table(
     stamps = None
     if clock is not None:
         array = contents.arrays[clock]
-        stamps = _numbers(array.load(0)) * parse_unit(array.unit or "s", f"{path}: {clock}").factor
+        stamps = numbers(array.load(0)) * parse_unit(array.unit or "s", f"{path}: {clock}").factor
     return RawTable(
         tuple(places), values, contents.words, max(rows.values()), labels,
         (*contents.findings, *missing(values), *long), stamps,
@@ -362,35 +377,3 @@ def _single(contents: Contents, options: FileOptions, path: Path) -> str | None:
     if len(several) != 1:
         raise RecordError(path, f"holds {contents.words}, expected `variable` under [file] to name one")
     return several[0]
-
-
-def _numbers(column: NDArray[Any]) -> Array:
-    """As float64, dates as seconds since 1970; NaN where infinite or beyond `LARGEST`."""
-    if column.dtype.kind in "Mm":
-        dated = ~np.isnat(column)
-        kind = "datetime64[ns]" if column.dtype.kind == "M" else "timedelta64[ns]"
-        whole, rest = np.divmod(column.astype(kind).astype(np.int64), 10**9)
-        return np.where(dated, whole + 1e-9 * rest, np.nan)
-    numbers = np.ascontiguousarray(column, dtype=np.float64)
-    if numbers.size and numbers.min() > -LARGEST and numbers.max() < LARGEST:
-        return numbers
-    return np.where(np.abs(numbers) < LARGEST, numbers, np.nan)
-
-
-def _rounded(column: NDArray[Any]) -> NDArray[np.int64]:
-    """Places of the integers that float64 cannot hold: they have more than 53 bits between the first and last 1."""
-    if column.dtype.kind not in "iu" or column.dtype.itemsize < 8:
-        return np.empty(0, np.int64)
-    size = np.abs(column).astype(np.uint64)
-    far = np.flatnonzero(size > np.uint64(2**53))
-    lowest = size[far] & (~size[far] + np.uint64(1))
-    rounded: NDArray[np.int64] = far[size[far] // lowest > np.uint64(2**53)]
-    return rounded
-
-
-def _texts(column: NDArray[Any]) -> tuple[str, ...]:
-    """As text: bytes decoded, whole numbers without a point, nothing for what is missing."""
-    if column.dtype.kind in "biuf":
-        return tuple(f"{value:.15g}" if value == value else "" for value in column.tolist())
-    texts = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in column)
-    return tuple("" if text is None else str(text).strip() for text in texts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import math
@@ -23,6 +24,7 @@ from inercal.foundation.records.read.table import LARGEST, FileOptions
 _BLOCK = LINE
 _GZIP = b"\x1f\x8b"
 _BOM = b"\xef\xbb\xbf"
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
@@ -77,14 +79,19 @@ class Block:
 def blocks(file: BufferedReader, path: Path) -> Iterator[Block]:
     """Blocks of lines of an open file, at least one; raises `RecordError` if it can't be text.
 
-    Lines end with a line feed, or with a carriage return where no line feed is in the first block.
+    Lines end with a line feed, or with a carriage return where no line feed is in the first block. UTF-16 is told by
+    its mark, and becomes UTF-8.
     """
     packed = file.peek(2)[:2] == _GZIP
     stream = gzip.GzipFile(fileobj=file) if packed else file
     first, early, held, read = 1, False, bytearray(), 0
     mark = b""
     try:
+        wide = stream.peek(2)[:2] in _UTF_16
+        decoder = codecs.getincrementaldecoder("utf-16")("replace") if wide else None
         while piece := stream.read1(_BLOCK):
+            if decoder is not None:
+                piece = decoder.decode(piece).encode()
             read += len(piece)
             if packed and read > unpacked(0):
                 check_unpacked(path, read, os.fstat(file.fileno()).st_size)

@@ -16,6 +16,7 @@ from inercal.foundation.records.channels import Channel
 from inercal.foundation.records.read.arrays import ArrayFormat, Contents, NamedArray, held
 from inercal.foundation.records.read.limits import NESTING
 from inercal.foundation.records.read.table import FileOptions, RawTable
+from inercal.foundation.units import shown
 
 _HEAD = 128
 _ORDERS = {b"IM": "<", b"MI": ">"}
@@ -70,8 +71,27 @@ def _opened(path: Path) -> Iterator[Contents]:
 
     _check_structure(path)
     content = loadmat(path, appendmat=False)
-    members = ((name, value) for name, value in content.items() if not name.startswith("__"))
-    yield Contents(dict(_arrays(members)))
+    members = {name: value for name, value in content.items() if not name.startswith("__")}
+    objects = {name: found for name, value in members.items() if (found := _object(value))}
+    arrays = dict(_arrays((name, value) for name, value in members.items() if name not in objects))
+    if objects and not arrays:
+        name, kind = next(iter(objects.values()))
+        writer = "writetimetable" if kind == "timetable" else "writetable"
+        raise RecordError(
+            path,
+            f"{shown(name)} is a MATLAB {kind}, which only MATLAB reads: run {writer}({name}, '{name}.csv'), "
+            "and give that file",
+        )
+    yield Contents(arrays)
+
+
+def _object(value: Any) -> tuple[str, str] | None:
+    """Name and class of an object of MATLAB, such as a timetable; None for anything else."""
+    fields = getattr(getattr(value, "dtype", None), "names", None) or ()
+    if not {"s0", "s2"} <= set(fields) or not value.size:
+        return None
+    name, kind = (value[field].flat[0] for field in ("s0", "s2"))
+    return name.decode("latin-1"), kind.decode("latin-1")
 
 
 def _check_structure(path: Path) -> None:
