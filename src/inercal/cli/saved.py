@@ -125,15 +125,17 @@ def compare(
 
 
 Tool = Literal["imu_tk", "imucal", "kalibr", "psins"]
+FilterTool = Literal["openvins", "vins"]
 
 
 def convert(
     files: Annotated[
-        list[Path], Parameter(help="Calibration; with --from imu_tk its accelerometers' and gyro's files.")
+        list[Path],
+        Parameter(help="Calibration, or noise; with --from imu_tk its accelerometers' and gyro's files."),
     ],
     /,
     *,
-    to: Annotated[Tool | None, Parameter(help="The tool to write for.")] = None,
+    to: Annotated[Tool | FilterTool | None, Parameter(help="The tool to write for.")] = None,
     source: Annotated[Tool | None, Parameter(name="--from", help="The tool that wrote the file.")] = None,
     acc_unit: Annotated[
         str | None,
@@ -145,6 +147,7 @@ def convert(
     output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Convert a calibration to or from another tool's."""
+    from inercal.faces.convert.noise_files import noise_to_tool
     from inercal.faces.convert.other_tools import CONVENTIONS, from_tool, to_tool
     from inercal.foundation.findings import Status
     from inercal.foundation.records.read import source_of
@@ -152,7 +155,9 @@ def convert(
 
     if to is None and source is None:
         raise InputError("--to", "missing, expected --to or --from and one of " + ", ".join(CONVENTIONS))
-    output.check(WHOLE if to is None else CONVENTIONS[to].suffixes, files)
+    output.check(
+        WHOLE if to is None else CONVENTIONS[to].suffixes if to in CONVENTIONS else (".yaml",), files
+    )
     units = {sensor: unit for sensor, unit in (("acc", acc_unit), ("gyro", gyro_unit)) if unit is not None}
     if source is None:
         if units:
@@ -169,6 +174,10 @@ def convert(
         output.say(f"{estimate.status.value}: {estimate.message}")
     if to is None:
         _write_calibration(estimate, output)
+    elif estimate.command == "allan":
+        _write_texts(noise_to_tool(estimate, to, files[0]), to, files, output)
+    elif to not in CONVENTIONS:
+        raise InputError(files[0], f"is no noise of `inercal allan`, expected it for {to}")
     else:
         _write_texts(to_tool(estimate, to, files[0]), to, files, output)
     return 0 if estimate.status is Status.OK else EXIT_BAD_VERDICT
@@ -186,7 +195,7 @@ def _write_calibration(estimate: Estimate, output: FileOutput) -> None:
     emit(replace(estimate, timing={}), f"{estimate.table()}\n\n{estimate.message}", output)
 
 
-def _write_texts(converted: Converted, tool: Tool, files: list[Path], output: FileOutput) -> None:
+def _write_texts(converted: Converted, tool: str, files: list[Path], output: FileOutput) -> None:
     """The files of the tool and the table of their terms; without --out their texts instead."""
     from inercal.foundation._files import write_text
 

@@ -241,7 +241,8 @@ COMMANDS = {
     ("convert", ""): (
         "inercal.cli.saved:convert",
         "Convert a calibration to another tool's convention, or from it.\n\n--to writes the file that imu_tk, "
-        "imucal, Kalibr or PSINS reads (imu_tk: one for each sensor); without --out it is printed. --from reads "
+        "imucal, Kalibr or PSINS reads (imu_tk: one for each sensor), of the noise of `inercal allan` that of Kalibr, "
+        "OpenVINS or VINS; without --out it is printed. --from reads "
         "such a file and writes a calibration (.json or .toml) for `inercal apply`; what the file does not state, "
         "such as uncertainty, stays unknown. Exit code 1: done, but the verdict on the calibration is not ok.",
         "inercal convert cal.json --to imucal --out cal_imucal.json",
