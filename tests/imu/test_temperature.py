@@ -17,8 +17,8 @@ from inercal.foundation.results.files import load, save
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.temperature.calibrations import fit_calibrations
-from inercal.systems.imu.temperature.cubic import fit_points, fit_sweep
 from inercal.systems.imu.temperature.figures import pictures
+from inercal.systems.imu.temperature.polynomial import fit_points, fit_sweep, order_of
 from inercal.systems.imu.temperature.sweep import branches, fit_recording
 
 TRUTH = np.array([1.0, -0.02, 3e-4, -2e-6])
@@ -82,6 +82,66 @@ def test_the_uncertainty_of_the_curve_holds_under_wandering_noise(wander):
         half = student.ppf(0.975, fit.dof) * np.sqrt(np.diag(fit.covariance))
         hits += np.abs(fit.coefficients - TRUTH) < half
     assert np.all(hits / 300 > 0.87)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 5])
+def test_the_data_tell_the_order(order):
+    """Powers that change the output by ten times its noise and more are found, and no higher one (BIC: one in some 30
+    sweeps has one more)."""
+    rng = np.random.default_rng(order)
+    T = sweep_of()
+    true = np.polynomial.chebyshev.chebval((T - 25.0) / 45.0, 0.2 / np.arange(1, order + 2))
+    found = [order_of(T, true + rng.normal(0.0, 0.02, len(T))) for _ in range(20)]
+    assert found.count(order) >= 17
+    assert min(found) == order
+
+
+def test_an_order_that_is_left_out_is_in_u():
+    """A fourth power that the data do not show: the data tell an order below it, and what it shifts stays within U."""
+    rng = np.random.default_rng(20261127)
+    T, hits, runs = sweep_of(), np.zeros(2), 60
+    truth = np.array([1.0, -0.02, 3e-4, -2e-6, 2e-9])
+    for _ in range(runs):
+        y = np.polynomial.polynomial.polyval(T - 25.0, truth) + rng.normal(0.0, 0.02, len(T))
+        estimate = fit_recording(record_of(T, gyro_x=y)).estimate
+        hits += [
+            abs(estimate[name].value - true) < estimate[name].U
+            for name, true in (("gyro_x", 1.0), ("gyro_x_T1", -0.02))
+        ]
+    assert np.all(hits >= runs * 0.95 - 3.0 * np.sqrt(runs * 0.95 * 0.05))
+
+
+@pytest.mark.parametrize(
+    "sweep", [sweep_of(), np.linspace(5.0, 50.0, 2000)], ids=["there and back", "one way"]
+)
+@pytest.mark.parametrize("jumps", [True, False], ids=["jump", "bend"])
+def test_a_jump_or_a_bend_is_named_with_its_temperature(sweep, jumps):
+    rng = np.random.default_rng(12)
+    shape = np.where(sweep > 31.0, 0.2 if jumps else 0.05 * (sweep - 31.0), 0.0)
+    record = record_of(sweep, gyro_x=cubic(sweep) + shape + rng.normal(0.0, 0.02, len(sweep)))
+    estimate = fit_recording(record).estimate
+    (finding,) = [finding for finding in estimate.findings if finding.code == "temperature_kink"]
+    assert ("jumps by" if jumps else "changes its slope by") in finding.headline
+    assert float(finding.headline.split(" at ")[1].split()[0]) == pytest.approx(31.0, abs=0.5)
+    assert estimate.status is Status.SUSPECT
+
+
+@pytest.mark.parametrize("wander", [0, 30, 300])
+@pytest.mark.parametrize(
+    "sweep", [sweep_of(), np.linspace(-20.0, 60.0, 2000)], ids=["there and back", "one way"]
+)
+def test_noise_alone_makes_no_jump(sweep, wander):
+    """None in 20 records, where a risk of 1 % for each makes one in 20 in 18 % of the time, and two in 2 %."""
+    rng = np.random.default_rng(47)
+    named = 0
+    for _ in range(20):
+        noise = rng.normal(0.0, 0.02, len(sweep))
+        if wander:
+            a = np.exp(-1.0 / wander)
+            noise += lfilter([1.0], [1.0, -a], rng.normal(0.0, 0.05 * np.sqrt(1.0 - a**2), len(sweep)))
+        findings = fit_recording(record_of(sweep, gyro_x=cubic(sweep) + noise)).estimate.findings
+        named += any(finding.code == "temperature_kink" for finding in findings)
+    assert named <= 1
 
 
 def test_a_difference_between_branches_is_measured_and_said():
@@ -251,6 +311,20 @@ def test_what_a_neglected_power_does_is_in_u():
             hits += np.abs(found.values - truth[:3]) <= found.k * found.u
         assert np.all(hits / 400 > 0.95 - 4.5 * np.sqrt(0.95 * 0.05 / 400))
     assert "higher ones are not" in found.findings[0].message
+
+
+def test_an_order_can_be_asked_for():
+    T = sweep_of()
+    names = fit_recording(record_of(T, gyro_x=cubic(T)), order=5).estimate.names
+    assert names[:6] == ("gyro_x", *(f"gyro_x_T{power}" for power in range(1, 6)))
+    with pytest.raises(InputError, match="order: found 6, expected 1 to 5"):
+        fit_recording(record_of(T, gyro_x=cubic(T)), order=6)
+    temperatures = np.linspace(-20.0, 60.0, 9)
+    estimates = [calibration(at, np.array([cubic(at), 1.0])) for at in temperatures]
+    model = fit_calibrations(estimates, files(9), order=4)
+    assert model.curves[0].polynomial.terms == 5
+    with pytest.raises(InputError, match="order: found 4, expected 1 to 3 for 5 temperatures"):
+        fit_calibrations(estimates[:5], files(5), order=4)
 
 
 def test_hysteresis_between_calibrations_on_the_way_up_and_down():

@@ -143,6 +143,12 @@ def temperature(
     at: Annotated[
         str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
     ] = "25 degC",
+    order: Annotated[
+        int | None,
+        Parameter(
+            help="Highest power of temperature, 1 to 5; if absent, of a sweep as the data tell, else a cubic."
+        ),
+    ] = None,
     output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
 ) -> int:
     """Fit what a sensor's output or its calibration does with temperature."""
@@ -158,22 +164,24 @@ def temperature(
         if map_file is not None:
             raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
         span.refuse("calibrations")
-        model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
+        model, read_s = _of_calibrations(files, reference, order), time.perf_counter() - clock
     else:
         from inercal.systems.imu.temperature.sweep import fit_recording
 
         record = read_record(files, map_file, output, span)
         read_s = time.perf_counter() - clock
-        model = fit_recording(record, reference)
+        model = fit_recording(record, reference, order)
     solve_s = time.perf_counter() - clock - read_s
     result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
     return give(result, output, read_s, "temperature model")
 
 
-def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
+def _of_calibrations(files: list[Path], reference: float, order: int | None) -> TemperatureModel:
     """The model of saved calibrations, in the order given."""
     from inercal.foundation.records.read import source_of
     from inercal.foundation.results.files import load
     from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
-    return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)
+    return fit_calibrations(
+        [load(file) for file in files], [source_of(file) for file in files], reference, order
+    )

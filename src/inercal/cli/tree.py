@@ -213,8 +213,9 @@ COMMANDS = {
     ("temperature", ""): (
         "inercal.cli.calibrate:temperature",
         "Fit what a sensor's output, or its calibration, does with temperature.\n\nFrom one recording at rest over a "
-        "sweep of temperature, or from calibrations made at several temperatures (in the order of time): a cubic with "
-        "uncertainties, and the hysteresis. --out saves it (.json or .toml), --report writes a page with pictures.",
+        "sweep of temperature, or from calibrations made at several temperatures (in the order of time): a polynomial "
+        "with uncertainties, jumps and hysteresis. --out saves it (.json or .toml), --report writes a page with "
+        "pictures.",
         "inercal temperature sweep.csv --map sweep-map.toml --report t.html",
     ),
     ("apply", ""): (

@@ -71,6 +71,7 @@ CODES: dict[str, Code] = {
     "stated_exact": Code("a quantity of the study was stated without an uncertainty", _NEVER),
     "considered": Code("an effect that is not fitted counts in u, by its usual size", _NEVER),
     "unused_labels": Code("labels of a recording that were of no use", _NEVER),
+    "temperature_kink": Code("an output jumps or bends at a temperature", _BY_SIZE),
     "hysteresis": Code("values on rising and on falling temperature or input differ", _NEVER),
     "dead_zone": Code("an output does not follow small changes of its input", _NEVER),
     "outside_range": Code("a value is stated outside the range it was measured over", _ALWAYS),

@@ -264,7 +264,9 @@ def _kinds_with(offer: str) -> str:
     return f"{', '.join(kinds)} or {last}" if kinds else last
 
 
-def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 25.0) -> Result:
+def temperature(
+    given: Record | Sequence[Result | Estimate], at: str | float = 25.0, order: int | None = None
+) -> Result:
     """Fit what a sensor's output, or its calibration, does with temperature.
 
     Parameters
@@ -273,16 +275,18 @@ def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 2
         A recording at rest over a sweep of temperature, or calibrations made at several, in the order of time.
     at : str or float
         Temperature about which the polynomial is written: ``"25 degC"``, or degrees Celsius.
+    order : int, optional
+        Highest power of temperature, 1 to 5. Without it, of a sweep that which the data tell, of calibrations 3.
 
     Returns
     -------
     Result
-        A cubic of each coefficient or channel, and its hysteresis.
+        A polynomial of each coefficient or channel, and its hysteresis.
 
     Raises
     ------
     InputError
-        No temperature, or too little of it.
+        No temperature, or too little of it; no such order.
 
     Examples
     --------
@@ -299,9 +303,9 @@ def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 2
     if isinstance(given, Record):
         from inercal.systems.imu.temperature.sweep import fit_recording
 
-        return of_temperature(fit_recording(given, about))
+        return of_temperature(fit_recording(given, about, order))
     from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
     estimates = [estimate_of(each)[0] for each in given]
     sources = [source for each in estimates for source in each.inputs[:1]]
-    return of_temperature(fit_calibrations(estimates, sources, about))
+    return of_temperature(fit_calibrations(estimates, sources, about, order))

@@ -180,7 +180,7 @@ _HOT = 74.0 ** np.arange(3, -1, -1)
 
 def _sweep() -> Array:
     """Contribution of each power at 74 degC."""
-    cubics = {curve.name: curve.cubic for curve in fit_recording(record_of("thermal"), 0.0).curves}
+    cubics = {curve.name: curve.polynomial for curve in fit_recording(record_of("thermal"), 0.0, 3).curves}
     return np.stack([cubics[name].coefficients[::-1] * _HOT for name in SWEEP])
 
 

@@ -308,6 +308,10 @@ class Limits:
     flat_temperature: float = 0.05
     """Slope of temperature, as a part of the largest, below which it neither rises nor falls."""
 
+    kink_gain: float = 30.0
+    """Gain of the log likelihood beyond which an output jumps or bends at a temperature; noise that wanders through a
+    sweep reaches 20 in one of 300."""
+
     hysteresis_probability: float = 0.01
     """Probability at which chance alone makes passes of any of the channels differ."""
 

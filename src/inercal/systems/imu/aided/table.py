@@ -43,7 +43,7 @@ class TableMotion:
 
     @cached_property
     def _cubics(self) -> Callable[[Array], Array]:
-        """Cubic through each pair of angles, with the slopes of parabolas through three."""
+        """TemperaturePolynomial through each pair of angles, with the slopes of parabolas through three."""
         from scipy.interpolate import CubicHermiteSpline
 
         slopes = np.gradient(self.angles, self.t, axis=0, edge_order=1)

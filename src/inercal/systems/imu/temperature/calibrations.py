@@ -14,12 +14,20 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.temperature.cubic import Cubic, fit_points
 from inercal.systems.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
+from inercal.systems.imu.temperature.polynomial import (
+    HIGHEST_ORDER,
+    TemperaturePolynomial,
+    counted_in,
+    fit_points,
+)
 
 
 def fit_calibrations(
-    estimates: Sequence[Estimate], files: Sequence[Source], reference: float = REFERENCE
+    estimates: Sequence[Estimate],
+    files: Sequence[Source],
+    reference: float = REFERENCE,
+    order: int | None = None,
 ) -> TemperatureModel:
     """Fit every coefficient of calibrations against the temperatures in their conditions.
 
@@ -36,12 +44,14 @@ def fit_calibrations(
         The files they are from, as many.
     reference : float
         T0 [degC].
+    order : int, optional
+        Highest power of temperature, 1 to 5, in place of the cubic.
 
     Raises
     ------
     InputError
-        Too few, a status other than ok and suspect, a calibration without a temperature or a standard uncertainty, or
-        one with other coefficients.
+        No such order, or fewer temperatures than it needs; too few calibrations, a status other than ok and suspect, a
+        calibration without a temperature or a standard uncertainty, or one with other coefficients.
     """
     if len(estimates) < LIMITS.fewest_calibrations:
         raise InputError(
@@ -69,7 +79,12 @@ def fit_calibrations(
     if np.ptp(T) < LIMITS.temperature_span:
         return TemperatureModel(no_span(float(T.min()), float(T.max()), files, ()))
     distinct = len(np.unique(np.round(T / 0.5)))
-    terms = min(4, distinct - 1)
+    if order is not None and not 1 <= order <= min(HIGHEST_ORDER, distinct - 2):
+        raise InputError(
+            "order",
+            f"found {order}, expected 1 to {min(HIGHEST_ORDER, distinct - 2)} for {distinct} temperatures",
+        )
+    terms = min(4, distinct - 1) if order is None else order + 1
     step = np.diff(T)
     rising = 0.5 * np.sign(np.concatenate([step[:1], step]))
     both = bool(min(np.sum(rising > 0), np.sum(rising < 0)) >= 2 and len(T) > terms + 2)
@@ -85,7 +100,7 @@ def fit_calibrations(
             fit_points(T, y, own, float(np.mean(common)), reference, more, terms)
             for more in ((nothing, rising[:, None]) if both else (nothing,))
         ]
-        if terms < 4:
+        if terms < 4 and order is None:
             fits[0] = _with_neglected(fits[0], T, y, own, float(np.mean(common)))
         curves.append(
             Curve(
@@ -110,14 +125,14 @@ def fit_calibrations(
         for estimate, file in zip(estimates, files, strict=True)
         if estimate.status is Status.SUSPECT
     ]
-    if terms < 4:
+    if terms < 4 and order is None:
         text = (
             f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic: what the "
             f"power {terms} of temperature would change is in u, higher ones are not"
         )
         findings.append(Finding("few_degrees_of_freedom", text))
     what = f"{len(curves)} coefficients from {len(T)} calibrations"
-    given = {"reference_degC": reference}
+    given = {"reference_degC": reference, "order": order}
     estimate = assemble(curves, reference, files, findings, given, what)
     result = {**estimate.result, "calibration": {"command": first.command, "result": _in_use(first)}}
     return TemperatureModel(replace(estimate, result=result), tuple(curves))
@@ -130,17 +145,16 @@ def _in_use(estimate: Estimate) -> dict[str, Any]:
     return {**kept, "rates": []} if "rates" in estimate.result else kept
 
 
-def _with_neglected(fit: Cubic, T: Array, y: Array, variances: Array, common: float) -> Cubic:
+def _with_neglected(
+    fit: TemperaturePolynomial, T: Array, y: Array, variances: Array, common: float
+) -> TemperaturePolynomial:
     """The fit with the next power counted in: the u of a fit that has it too, and by how much that one moves."""
     birge = max(1.0, float(np.sum(fit.residuals**2 / variances)) / (len(T) - fit.terms))
-    more = fit_points(T, y, birge * variances, common, fit.reference, np.empty((len(T), 0)), fit.terms + 1)
-    own = slice(fit.terms)
-    moves = more.coefficients[own] - fit.coefficients
-    covariance = more.covariance[own, own] + np.outer(moves, moves)
-    return replace(fit, covariance=covariance, dof=np.minimum(fit.dof, more.dof[own]))
+    nothing = np.empty((len(T), 0))
+    return counted_in(fit, fit_points(T, y, birge * variances, common, fit.reference, nothing, fit.terms + 1))
 
 
-def _apart(fit: Cubic, both: bool) -> tuple[float, bool]:
+def _apart(fit: TemperaturePolynomial, both: bool) -> tuple[float, bool]:
     """The difference between rising and falling, 0 where there are not both, and whether it is more than chance."""
     if not both:
         return 0.0, False

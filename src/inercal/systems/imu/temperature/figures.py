@@ -28,8 +28,8 @@ def _group(curves: list[Curve]) -> Picture:
     panels = []
     for number, curve in enumerate(curves):
         grid = np.linspace(curve.temperature.min(), curve.temperature.max(), 201)
-        fitted, u = curve.cubic.value(grid), curve.cubic.u(grid)
-        measured, left = _dots(curve, curve.values), _dots(curve, curve.cubic.residuals)
+        fitted, u = curve.polynomial.value(grid), curve.polynomial.u(grid)
+        measured, left = _dots(curve, curve.values), _dots(curve, curve.polynomial.residuals)
         band = Area(grid, fitted - 2.0 * u, fitted + 2.0 * u, colour=INK)
         across = Axis("temperature [°C]" if number == len(curves) - 1 else "")
         heads = ("values and polynomial (band: ± 2 u)", "residuals") if number == 0 else ("", "")

@@ -1,7 +1,7 @@
 """Coefficients over temperature: the estimate of a sweep, or of calibrations at several temperatures.
 
-``y = c + T1 d + T2 d^2 + T3 d^3``, d = T - T0, for each quantity; its value at T0 keeps its name, the others end in
-``_T1``, ``_T2``, ``_T3``. ``_hyst`` is the mean difference between rising and falling temperature.
+``y = c + T1 d + T2 d^2 + ..``, d = T - T0, to the fifth power at most, for each quantity; its value at T0 keeps its
+name, the others end in ``_T1`` to ``_T5``. ``_hyst`` is the mean difference between rising and falling temperature.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.temperature.cubic import Cubic
+from inercal.systems.imu.temperature.polynomial import TemperaturePolynomial
 
 COMMAND = "temperature"
 
@@ -27,7 +27,7 @@ REFERENCE = 25.0
 """T0 [degC], the temperature at which data sheets state coefficients."""
 
 MODEL = Formula(
-    "$y = c + T_1 d + T_2 d^2 + T_3 d^3$, $d = T - T_0$; hyst: output on rising less that on falling temperature, its "
+    "$y = c + T_1 d + T_2 d^2 + \\dots$, $d = T - T_0$; hyst: output on rising less that on falling temperature, its "
     "mean over the range"
 )
 
@@ -37,10 +37,10 @@ class Curve:
     """A quantity against temperature.
 
     ``values`` (n,) [``unit``] at ``temperature`` (n,) [degC], on branches ``rising`` (n,) of +1/2, -1/2 or 0 where it
-    is neither; ``cubic`` the fit through all, ``branched`` the one whose last coefficient is the difference between the
-    branches (None where there are not both), ``apart`` the largest difference between two passes at one temperature
-    and ``beyond_chance`` whether that is more than noise can make, ``u`` (n,) standard uncertainties of single values
-    (None: of samples).
+    is neither; ``polynomial`` the fit through all, ``branched`` the one whose last coefficient is the difference
+    between the branches (None where there are not both), ``apart`` the largest difference between two passes at one
+    temperature and ``beyond_chance`` whether that is more than noise can make, ``u`` (n,) standard uncertainties of
+    single values (None: of samples).
     """
 
     name: str
@@ -48,8 +48,8 @@ class Curve:
     temperature: Array
     values: Array
     rising: Array
-    cubic: Cubic
-    branched: Cubic | None
+    polynomial: TemperaturePolynomial
+    branched: TemperaturePolynomial | None
     apart: float
     beyond_chance: bool
     u: Array | None = None
@@ -57,19 +57,19 @@ class Curve:
     @property
     def scatter(self) -> float:
         """Standard deviation of the residuals [``unit``]."""
-        return float(np.std(self.cubic.residuals))
+        return float(np.std(self.polynomial.residuals))
 
     @property
     def explained(self) -> float:
-        """Part of the variance that the cubic explains (R^2); all of it where there is none."""
+        """Part of the variance that the polynomial explains (R^2); all of it where there is none."""
         whole = float(np.var(self.values))
-        return 1.0 - float(np.var(self.cubic.residuals)) / whole if whole > 0.0 else 1.0
+        return 1.0 - float(np.var(self.polynomial.residuals)) / whole if whole > 0.0 else 1.0
 
     @property
     def change(self) -> float:
-        """Largest less smallest value of the cubic over the range of temperature."""
+        """Largest less smallest value of the polynomial over the range of temperature."""
         grid = np.linspace(self.temperature.min(), self.temperature.max(), 201)
-        return float(np.ptp(self.cubic.value(grid)))
+        return float(np.ptp(self.polynomial.value(grid)))
 
 
 @short_repr
@@ -98,14 +98,14 @@ def assemble(
     dof: list[float] = []
     blocks: list[Array] = []
     for curve in curves:
-        fits = [(curve.cubic, slice(0, curve.cubic.terms))]
+        fits = [(curve.polynomial, slice(0, curve.polynomial.terms))]
         if curve.branched is not None:
             fits.append((curve.branched, slice(curve.branched.terms, None)))
         for fit, part in fits:
             blocks.append(fit.covariance[part, part])
             values += fit.coefficients[part].tolist()
             dof += fit.dof[part].tolist()
-        orders = range(curve.cubic.terms)
+        orders = range(curve.polynomial.terms)
         names += [curve.name + (f"_T{order}" if order else "") for order in orders]
         units += [
             curve.unit + ("" if order == 0 else "/K" if order == 1 else f"/K^{order}") for order in orders
@@ -140,7 +140,7 @@ def assemble(
                 {
                     "name": curve.name,
                     "unit": curve.unit,
-                    "terms": curve.cubic.terms,
+                    "terms": curve.polynomial.terms,
                     "change": curve.change,
                     "residual_std": curve.scatter,
                     "r2": curve.explained,

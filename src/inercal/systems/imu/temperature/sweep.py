@@ -2,8 +2,8 @@
 
 The output of a gyro at rest is its bias (and earth rate); that of an accelerometer is its bias and its scale factor
 times gravity along it, so that of the latter only the change with temperature belongs to the instrument. A sweep goes
-up and down, and its branches differ: the thermometer lags behind the sensor, and materials remember. The cubic goes
-through the middle; the difference is a coefficient of its own.
+up and down, and its branches differ: the thermometer lags behind the sensor, and materials remember. The polynomial
+goes through the middle; the difference is a coefficient of its own.
 """
 
 from __future__ import annotations
@@ -14,20 +14,28 @@ from itertools import combinations
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.errors import RecordError
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.findings import Finding
 from inercal.foundation.records.checks.values import is_dead
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.temperature.cubic import PARTS, fit_sweep
 from inercal.systems.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
+from inercal.systems.imu.temperature.polynomial import (
+    HIGHEST_ORDER,
+    PARTS,
+    fit_sweep,
+    kink,
+    order_of,
+    with_next_power,
+)
 
 _MEASURED = re.compile(r"acc_[xyz]|gyro_[xyz]|a[1-9]\d*|gyro(_roll|_yaw)?")
 _MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
 
 
-def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureModel:
+def fit_recording(record: Record, reference: float = REFERENCE, order: int | None = None) -> TemperatureModel:
     """Fit every accelerometer and gyro channel of a static recording against its temperature channel.
 
     A channel that never changes is left out: it is dead, as the record's findings say.
@@ -38,12 +46,19 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
         ``temperature`` and the channels; the instrument must be at rest throughout.
     reference : float
         T0 [degC].
+    order : int, optional
+        Highest power of temperature, 1 to 5. Without it the data tell that of each channel, and u holds what the next
+        power would change.
 
     Raises
     ------
     RecordError
         No temperature channel, no other channel, or too few samples.
+    InputError
+        No such order.
     """
+    if order is not None and not 1 <= order <= HIGHEST_ORDER:
+        raise InputError("order", f"found {order}, expected 1 to {HIGHEST_ORDER}")
     temperature = record["temperature"]
     channels = [column for name, column in record.columns.items() if _MEASURED.fullmatch(name)]
     where = temperature.source.path
@@ -63,16 +78,18 @@ def fit_recording(record: Record, reference: float = REFERENCE) -> TemperatureMo
         names = ", ".join(channel.name for channel in channels)
         raise RecordError(where, f"{names}: never changing, expected a live sensor")
     curves = tuple(
-        _curve(channel, temperature, reference, LIMITS.hysteresis_probability / len(live)) for channel in live
+        _curve(channel, temperature, reference, order, LIMITS.hysteresis_probability / len(live))
+        for channel in live
     )
+    findings = (*record.findings, *(finding for curve in curves if (finding := _kinked(curve))))
     what = f"{counted(len(curves), 'channel')} at rest"
     estimate = assemble(
-        curves, reference, record.sources, record.findings, {"reference_degC": reference}, what
+        curves, reference, record.sources, findings, {"reference_degC": reference, "order": order}, what
     )
     return TemperatureModel(estimate, curves)
 
 
-def _curve(channel: Column, temperature: Column, reference: float, risk: float) -> Curve:
+def _curve(channel: Column, temperature: Column, reference: float, order: int | None, risk: float) -> Curve:
     """One channel, at its samples that have both a value and a temperature."""
     at = temperature.si()
     if channel.t is not temperature.t:
@@ -88,6 +105,8 @@ def _curve(channel: Column, temperature: Column, reference: float, risk: float) 
     T, y = at[good], channel.values[good]
     rising = branches(T)
     nothing = np.empty((len(T), 0))
+    terms = 1 + (order_of(T, y) if order is None else order)
+    fit = fit_sweep(T, y, reference, nothing, terms)
     both = min(np.count_nonzero(rising > 0), np.count_nonzero(rising < 0)) * 8 > len(T)
     return Curve(
         channel.name,
@@ -95,9 +114,33 @@ def _curve(channel: Column, temperature: Column, reference: float, risk: float) 
         T,
         y,
         rising,
-        fit_sweep(T, y, reference, nothing),
-        fit_sweep(T, y, reference, rising[:, None]) if both else None,
+        fit if order is not None else with_next_power(fit, T, y),
+        fit_sweep(T, y, reference, rising[:, None], terms) if both else None,
         *_apart(T, y, risk),
+    )
+
+
+def _kinked(curve: Curve) -> Finding | None:
+    """The finding of an output that jumps or bends at a temperature, which no coefficient of a polynomial describes."""
+    found = kink(curve.temperature, curve.values)
+    if found.gain < LIMITS.kink_gain:
+        return None
+    whole = curve.polynomial
+    parted = fit_sweep(curve.temperature, curve.values, whole.reference, found.shape[:, None], whole.terms)
+    size = float(parted.coefficients[-1])
+    off = parted.value(curve.temperature) + size * found.shape - whole.value(curve.temperature)
+    most = float(np.max(np.abs(off)))
+    names = tuple(curve.name + (f"_T{power}" if power else "") for power in range(whole.terms))
+    change = (
+        f"jumps by {size:.3g} {curve.unit}"
+        if found.jumps
+        else f"changes its slope by {size:.3g} {curve.unit}/K"
+    )
+    return Finding(
+        "temperature_kink",
+        f"{curve.name} {change} at {found.temperature:.1f} degC, a polynomial is off by up to {most:.3g} {curve.unit}",
+        harm=names,
+        action="look for a compensation table or a heater of the instrument, or fit both sides apart (--begin, --end)",
     )
 
 
