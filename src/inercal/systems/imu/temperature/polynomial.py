@@ -137,21 +137,24 @@ class Kink(NamedTuple):
 def kink(temperature: Array, values: Array) -> Kink:
     """The likeliest jump or bend of the output of a sweep (n,), beside a polynomial of the highest order."""
     d = (temperature - temperature.mean()) / np.ptp(temperature)
-    A = powers(d, HIGHEST_ORDER + 1)
-    means, y = _part_means(A), _part_means(values[:, None])[:, 0]
-    base = _likelihood(means, y)
+    means = _part_means(np.column_stack([powers(d, HIGHEST_ORDER + 1), values]))
+    whiten, root = _whitening(PARTS)
+    Q, R = np.linalg.qr(whiten @ means)
+    left, chi2, n = Q[:, :, -1] * R[:, -1:, -1], R[:, -1, -1] ** 2, PARTS  # what the polynomial leaves
+    base = float(np.max(-0.5 * n * np.log(np.maximum(chi2, 1e-300)) + np.log(root)))
 
     def likeliest(places: Array) -> Kink:
-        shapes = (
-            (place, jumps, np.where(temperature > place, 1.0 if jumps else temperature - place, 0.0))
-            for place in places.tolist()
-            for jumps in (True, False)
-        )
-        found = (
-            Kink(*shape, _likelihood(np.column_stack([means, _part_means(shape[2][:, None])]), y) - base)
-            for shape in shapes
-        )
-        return max(found, key=lambda found: found.gain)
+        beyond = temperature[:, None] - places
+        shapes = np.concatenate([beyond > 0.0, np.maximum(beyond, 0.0)], axis=1)
+        columns = whiten @ _part_means(shapes)
+        columns -= Q[:, :, :-1] @ (Q[:, :, :-1].mT @ columns)
+        size = np.maximum(np.sum(columns**2, axis=1), 1e-300)
+        less = (left[:, None] @ columns)[:, 0] ** 2 / size
+        fall = np.log(np.maximum(chi2[:, None] - less, 1e-300))
+        gains = np.max(-0.5 * n * fall + np.log(root)[:, None], axis=0) - base
+        best = int(np.argmax(gains))
+        at = float(places[best % len(places)])
+        return Kink(at, best < len(places), shapes[:, best], float(gains[best]))
 
     places = np.quantile(temperature, np.linspace(0.08, 0.92, _PLACES))
     near = int(np.argmin(np.abs(places - likeliest(places).temperature)))
