@@ -20,12 +20,11 @@ import orjson
 from measure import PROCESSOR, WALL, Row, Spread, alone, in_turn, row
 
 from inercal.bench.workbench.bench import Bench, open_bench
-from inercal.bench.workbench.charts import figure
-from inercal.bench.workbench.plans import named
+from inercal.bench.workbench.charts import course_figure
+from inercal.bench.workbench.form import named
 from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
-from inercal.faces.python.beginning import course, foresight
-from inercal.faces.python.study import read_study
+from inercal.faces.python.study import course, foresight, read_study
 from inercal.faces.studies.text import with_keys
 from inercal.systems.listed import SYSTEMS
 
@@ -76,7 +75,7 @@ def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
     (held,) = bench.look(session)
 
     def zoom(begin: float, end: float) -> int:
-        return len(orjson.dumps(figure(held.courses, (begin, end), held.notes)))
+        return len(orjson.dumps(course_figure(held.courses, (begin, end), held.notes)))
 
     whole = float(channels["t [s]"][-1])
     middle = 0.4 * whole

@@ -291,8 +291,8 @@ def _terms(found: Iterable[Any]) -> str:
 
 def reference_types() -> str:
     """The reference types of certificates."""
-    from inercal.foundation.instruments.reference_types import OTHERS
-    from inercal.foundation.instruments.reference_types import reference_types as types
+    from inercal.foundation.instruments.dsi import OTHERS
+    from inercal.foundation.instruments.dsi import reference_types as types
 
     rows = [(code(kind), meaning, code(unit)) for kind, (meaning, unit) in types().items()]
     return table(

@@ -103,12 +103,12 @@ if TYPE_CHECKING:
     from inercal.faces.python.calibrations import apply as apply
     from inercal.faces.python.calibrations import compare as compare
     from inercal.faces.python.calibrations import load as load
-    from inercal.faces.python.noise import allan as allan
     from inercal.faces.python.recordings import read as read
     from inercal.faces.python.recordings import record as record
     from inercal.faces.python.result import Result as Result
     from inercal.faces.python.study import Study as Study
     from inercal.faces.python.study import study as study
+    from inercal.faces.python.verbs import allan as allan
     from inercal.faces.python.verbs import calibrate as calibrate
     from inercal.faces.python.verbs import design as design
     from inercal.faces.python.verbs import runs as runs

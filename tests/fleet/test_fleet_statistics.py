@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest
 
-from inercal.laboratory.fleet.capability import Share, spreads
-from inercal.laboratory.fleet.fleet import RISK, TREND_RISK, distances, fleet_of, limit
+from inercal.laboratory.fleet.fleet import RISK, TREND_RISK, Share, distances, fleet_of, limit, spreads
 from inercal.laboratory.fleet.unit import Coefficient, UnitRow
 from inercal.laboratory.specification import specification_of
 

@@ -22,13 +22,12 @@ from inercal.laboratory.catalog import instruments, results, show, values_of
 from inercal.laboratory.certificate.reading import certificate_of
 from inercal.laboratory.certificate.written import certificate
 from inercal.laboratory.check import check
-from inercal.laboratory.database import writing
+from inercal.laboratory.database import Event, Tables, writing
 from inercal.laboratory.issue import issuing, supersede
 from inercal.laboratory.keep import Item, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.scrub import scrub
 from inercal.laboratory.store import digest_of, happened, make_store, open_store
-from inercal.laboratory.tables import Event, Tables
 from rows import for_each
 
 SECRET = "Hunter2SeCrEt"

@@ -264,7 +264,7 @@ def test_the_migrations_make_the_tables_that_the_program_reads(store):
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
 
-    from inercal.laboratory.tables import Tables
+    from inercal.laboratory.database import Tables
 
     with store.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Tables.metadata) == []

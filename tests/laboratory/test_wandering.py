@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.laboratory.chart import FIRST, chart
+from inercal.laboratory.history import FIRST, chart
 from inercal.laboratory.wander import CalibrationSeries, wandering
 
 STATED = 0.9545

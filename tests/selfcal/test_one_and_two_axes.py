@@ -10,8 +10,8 @@ from independent.selfcal_driven import Place, driven
 from scipy.stats import chi2
 
 import inercal as ic
+from inercal.cli.calibrate import _live
 from inercal.cli.options import ResultOutput
-from inercal.cli.selfcal import _live
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import run
 from inercal.foundation.errors import RecordError, StudyError

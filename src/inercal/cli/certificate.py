@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, StoreOption
-from inercal.cli.outcome import emit
+from inercal.cli.outcome import tell
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.shown import aligned
 
@@ -42,7 +42,7 @@ def certificate(
     html: Annotated[Path | None, Parameter(help="Write the certificate as a readable page.")] = None,
     read: Annotated[Path | None, Parameter(help="Read this certificate, of anybody, and print it.")] = None,
     store: StoreOption = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),
 ) -> None:
     """Write a digital calibration certificate, or read one."""
     if html is not None and html.suffix.lower() not in (".html", ".htm"):
@@ -87,10 +87,9 @@ def _write(
     from contextlib import AbstractContextManager, nullcontext
     from datetime import UTC, datetime
 
-    from inercal.foundation._files import read_bytes, write_bytes, write_text
+    from inercal.foundation._files import input_bytes, write_bytes, write_text
     from inercal.foundation.records.places import counted
     from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.lab import read_lab
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import certificate_of
@@ -99,12 +98,7 @@ def _write(
 
     stated = read_lab(lab)
     opened = _store(store)
-    reports: list[bytes | None] = []
-    for path in pages:
-        try:
-            reports.append(read_bytes(path))
-        except OSError as error:
-            raise InputError(path, f"cannot be read ({error.strerror}), expected a report") from error
+    reports: list[bytes | None] = [input_bytes(path, "a report") for path in pages]
     reports += [None] * (len(results) - len(reports))
     found = [_result(each, opened, report) for each, report in zip(results, reports, strict=True)]
     estimates = [estimate for estimate, _ in found]
@@ -130,7 +124,7 @@ def _write(
     words += f", entered in {opened.where}" if opened is not None else "; no store keeps it or its number"
     data = {"number": number, "out": str(output.out), "html": None if html is None else str(html)}
     sources = tuple(source_of(path) for path in (*map(Path, results), lab, *pages) if path.is_file())
-    emit(without_coefficients("certificate", words, data, sources), words, output)
+    tell(output, "certificate", words, data, sources)
 
 
 def _store(given: str | None) -> Store | None:
@@ -184,7 +178,6 @@ def _read(path: Path, html: Path | None, output: FileOutput) -> None:
     """Print what a certificate states, and write it as a page where that is asked for."""
     from inercal.foundation._files import write_text
     from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import read_certificate
 
@@ -215,7 +208,7 @@ def _read(path: Path, html: Path | None, output: FileOutput) -> None:
         ],
     }
     text = "\n".join([*_table(found), "", words])
-    emit(without_coefficients("certificate", words, result, (source_of(path),)), text, output)
+    tell(output, "certificate", words, result, (source_of(path),), text)
 
 
 def _table(found: Certificate) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -12,12 +11,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Table, insert, select
 
+from inercal.foundation._files import umask
 from inercal.foundation.errors import InputError
 from inercal.laboratory.check import check
-from inercal.laboratory.database import engine_of, migrate, reading, writing
-from inercal.laboratory.objects import Objects
-from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Certified,
     IssuedCertificate,
     Setting,
@@ -30,7 +27,13 @@ from inercal.laboratory.tables import (
     Supersession,
     Tables,
     Used,
+    engine_of,
+    migrate,
+    reading,
+    writing,
 )
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
 
 Progress = Callable[[int, int], None] | None
 
@@ -49,20 +52,13 @@ def export_store(store: Store, folder: Path, progress: Progress = None) -> Store
         raise InputError(folder, f"cannot be made ({error.strerror})") from error
     try:
         _copy(store, made, progress)
-        made.chmod(0o777 & ~_mask())
+        made.chmod(0o777 & ~umask())
         made.replace(folder)
     except OSError as error:
         raise InputError(folder, f"cannot be made ({error.strerror})") from error
     finally:
         shutil.rmtree(made, ignore_errors=True)
     return open_store(str(folder))
-
-
-def _mask() -> int:
-    """The process's file mode mask."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _copy(store: Store, folder: Path, progress: Progress) -> None:

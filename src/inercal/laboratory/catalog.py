@@ -12,10 +12,7 @@ from sqlalchemy import func, select
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import from_json
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.database import reading
-from inercal.laboratory.keep import Item
-from inercal.laboratory.store import Store
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Certified,
     IssuedCertificate,
     SourceOf,
@@ -26,7 +23,10 @@ from inercal.laboratory.tables import (
     StoredResult,
     Supersession,
     Used,
+    reading,
 )
+from inercal.laboratory.keep import Item
+from inercal.laboratory.store import Store
 
 SHORT = 10
 """Digits of an identity that are shown."""

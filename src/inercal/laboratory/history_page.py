@@ -20,8 +20,7 @@ from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import aligned, rounded
-from inercal.laboratory.chart import LIMIT, Mask
-from inercal.laboratory.history import HORIZON, REFERENCES, YEAR, Course, History
+from inercal.laboratory.history import HORIZON, LIMIT, REFERENCES, YEAR, Course, History, Mask
 from inercal.laboratory.specification import group_of
 from inercal.laboratory.wander import Interval
 

@@ -13,9 +13,8 @@ from sqlalchemy import insert, select
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT, find
-from inercal.laboratory.database import writing
+from inercal.laboratory.database import Certified, IssuedCertificate, StoredResult, Supersession, writing
 from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import Certified, IssuedCertificate, StoredResult, Supersession
 
 
 def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, str]:

@@ -12,13 +12,12 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from inercal.foundation.addresses import without_secrets
+from inercal.foundation.arrays import finite
 from inercal.foundation.errors import InputError
 from inercal.foundation.inputs import program
 from inercal.foundation.results.files import plain_objects, to_json
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.database import reading, writing
-from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     SourceOf,
     StoredCoefficient,
     StoredFile,
@@ -26,7 +25,10 @@ from inercal.laboratory.tables import (
     StoredReference,
     StoredResult,
     Used,
+    reading,
+    writing,
 )
+from inercal.laboratory.store import Store, digest_of, happened, now
 
 LARGE = 1 << 30
 """Bytes beyond which a file is kept by reference: its path and SHA-256."""
@@ -202,12 +204,12 @@ def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
         {
             "name": plain_objects(p.name),
             **{
-                key: _finite(value)
+                key: finite(value)
                 for key, value in (("value", p.value), ("u", p.u), ("expanded", p.U), ("k", p.k))
             },
-            "dof": _finite(p.dof),
+            "dof": finite(p.dof),
             "unit": plain_objects(p.unit),
-            "common": None if common is None else _finite(math.sqrt(max(float(common[i]), 0.0))),
+            "common": None if common is None else finite(math.sqrt(max(float(common[i]), 0.0))),
         }
         for i, p in enumerate(estimate.parameters.values())
     )
@@ -224,11 +226,6 @@ def references_of(data: Mapping[str, Any]) -> tuple[dict[str, str], ...]:
         if isinstance(each, Mapping)
     ]
     return tuple(dict(zip(keys, row, strict=True)) for row in sorted({tuple(row.values()) for row in rows}))
-
-
-def _finite(value: float) -> float | None:
-    """A finite number, else None."""
-    return value if math.isfinite(value) else None
 
 
 def add_rows(connection: Connection, rows: StoredRows, instrument_id: int | None) -> None:

@@ -19,11 +19,7 @@ from inercal.foundation.addresses import holds_secret, without_login, without_se
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import plain_objects
 from inercal.laboratory.check import check, digests_of
-from inercal.laboratory.database import vacuum, writing
-from inercal.laboratory.migrations.append_only import suspended
-from inercal.laboratory.objects import Objects
-from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Event,
     IssuedCertificate,
     Setting,
@@ -32,7 +28,12 @@ from inercal.laboratory.tables import (
     StoredResult,
     Tables,
     Used,
+    vacuum,
+    writing,
 )
+from inercal.laboratory.migrations.append_only import suspended
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
 
 _APPEND_ONLY = (
     "recording",
@@ -159,8 +160,7 @@ def _certificate(content: bytes) -> bytes:
     """A certificate without secrets in its texts and in the files inside it."""
     from lxml import etree
 
-    from inercal.laboratory.certificate.elements import DCC
-    from inercal.laboratory.certificate.parsing import tree_of
+    from inercal.laboratory.certificate.elements import DCC, tree_of
 
     root, changed = tree_of(content, "certificate"), False
     for element in root.iter(f"{{{DCC}}}*"):

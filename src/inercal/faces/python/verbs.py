@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inercal.faces.python.calibrations import estimate_of
-from inercal.faces.python.result import Result
+from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Study, study, study_of
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.system import SYSTEM as IMU
 from inercal.systems.listed import SYSTEMS
+
+if TYPE_CHECKING:
+    from inercal.faces.report.html import Picture
 
 
 def calibrate(
@@ -305,3 +309,59 @@ def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 2
     estimates = [estimate_of(each)[0] for each in given]
     sources = [source for each in estimates for source in each.inputs[:1]]
     return of_temperature(fit_calibrations(estimates, sources, about))
+
+
+def allan(record: Record) -> Result:
+    """Tell the noise of an instrument from a recording at rest.
+
+    Parameters
+    ----------
+    record : Record
+        At rest; ``record.between(...)`` takes a part of it.
+
+    Returns
+    -------
+    Result
+        N, B, K, R and Q of every channel that measures motion, with uncertainties; ``evidence.channels`` have the
+        Allan deviations.
+
+    Raises
+    ------
+    RecordError
+        No such channel, hardly any samples, or time stamps that do not increase.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> import numpy as np
+    >>> white = np.random.default_rng(1).standard_normal(6000) * 1e-3
+    >>> noise = ic.allan(ic.record(gyro_z=white, rate=100.0))
+    >>> round(noise["N_gyro_z"].value, 6), noise["N_gyro_z"].unit
+    (0.0001, 'rad/sqrt(s)')
+    """
+    from inercal.foundation.noise.outcome import noise_of
+
+    noise = noise_of(record)
+
+    def tables() -> list[str]:
+        from inercal.faces.report.allan import table
+
+        return [table(noise)]
+
+    def page() -> str:
+        from inercal.faces.report.allan import page as of_page
+
+        return of_page(noise)
+
+    def picture() -> Picture:
+        from inercal.faces.report.allan import pictures
+
+        return pictures(noise)[0]
+
+    estimate = noise.estimate
+    first = noise.channels[0]
+    seen = f"N_{first.name}"
+    words = f"{len(noise.channels)} channels"
+    if seen in estimate.names:
+        words += f", of the first {seen} = {estimate[seen].value:.3g} {estimate[seen].unit}"
+    return Result(estimate, View(estimate, words, tables, page, picture), noise)

@@ -17,13 +17,11 @@ from scipy.optimize import brentq
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
-from inercal.foundation.instruments.dsi import as_written, from_dsi
-from inercal.foundation.instruments.reference_types import PREFIX
+from inercal.foundation.instruments.dsi import PREFIX, as_written, from_dsi
 from inercal.foundation.results.files import parse
 from inercal.foundation.results.result import COVERAGE, Estimate, coverage_factor
 from inercal.foundation.units import shown
-from inercal.laboratory.certificate.elements import DCC, NAMESPACES
-from inercal.laboratory.certificate.parsing import parsed, tree_of
+from inercal.laboratory.certificate.elements import DCC, NAMESPACES, parsed, tree_of
 from inercal.laboratory.certificate.schema import VERSION, fault
 
 if TYPE_CHECKING:

@@ -14,12 +14,10 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent
-from inercal.foundation.instruments.reference_types import PREFIX, reference_type
+from inercal.foundation.instruments.dsi import PREFIX, as_written, dsi, from_dsi, is_coherent, reference_type
 from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.files import to_json
 from inercal.foundation.results.result import COVERAGE, Estimate, coverage_factor
-from inercal.laboratory.certificate.administration import software
 from inercal.laboratory.certificate.elements import (
     dcc,
     factor,
@@ -31,6 +29,7 @@ from inercal.laboratory.certificate.elements import (
     si,
     words,
 )
+from inercal.laboratory.certificate.written import software
 from inercal.laboratory.specification import Conformity, Specification
 
 if TYPE_CHECKING:

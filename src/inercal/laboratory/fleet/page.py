@@ -16,8 +16,7 @@ from inercal.faces.report.style import ALARM, COLOURS, QUIET
 from inercal.foundation.records.places import counted
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import aligned, rounded
-from inercal.laboratory.fleet.capability import LEVEL, Index, Spread
-from inercal.laboratory.fleet.fleet import Fleet, Trend
+from inercal.laboratory.fleet.fleet import LEVEL, Fleet, Index, Spread, Trend
 from inercal.laboratory.specification import group_of
 
 _FIRST = 50

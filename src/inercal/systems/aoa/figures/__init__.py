@@ -20,12 +20,12 @@ from inercal.faces.report.over_time import (
     largest,
     measured,
     middle,
+    of_angle,
     over_time,
     rms,
     span,
     stretches,
 )
-from inercal.faces.report.spectra import of_angle
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import principal
 from inercal.foundation.units import STANDARD_GRAVITY
