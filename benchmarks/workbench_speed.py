@@ -21,7 +21,7 @@ from measure import PROCESSOR, WALL, Row, Spread, alone, in_turn, row
 
 from inercal.bench.workbench.bench import Bench, open_bench
 from inercal.bench.workbench.charts import course_figure
-from inercal.bench.workbench.form import named
+from inercal.bench.workbench.pages.form import named
 from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
 from inercal.faces.python.study import course, foresight, read_study

@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario
 
-from inercal.faces.report.over_time import (
+from inercal.foundation.units import Quantity, parse_unit
+from inercal.systems.aoa.band import Band
+from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.figures import page as page_of
+from inercal.systems.aoa.figures import pictures, sensors
+from inercal.systems.aoa.figures.learned import consistency
+from inercal.systems.aoa.figures.panels import (
     Marks,
     Signals,
     gaps,
@@ -23,12 +29,6 @@ from inercal.faces.report.over_time import (
     stretches,
     thinned,
 )
-from inercal.foundation.units import Quantity, parse_unit
-from inercal.systems.aoa.band import Band
-from inercal.systems.aoa.disturbances import Disturbances, Oscillation
-from inercal.systems.aoa.figures import page as page_of
-from inercal.systems.aoa.figures import pictures, sensors
-from inercal.systems.aoa.figures.learned import consistency
 from inercal.systems.aoa.settings import Attitude
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure

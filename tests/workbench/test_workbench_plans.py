@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inercal.bench.workbench.form import lines_of, named, with_found, with_lines
+from inercal.bench.workbench.pages.form import lines_of, named, with_found, with_lines
 from inercal.examples import FOLDER
 from inercal.faces.python.study import read_study, verticals
 from inercal.faces.studies.text import with_keys

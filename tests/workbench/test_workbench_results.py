@@ -5,7 +5,7 @@ import pytest
 
 from inercal.bench.workbench.charts import Notes, course_figure, courses, marks_of, parts_of, spans_of
 from inercal.bench.workbench.charts import residual_figure as of_residuals
-from inercal.bench.workbench.form import advice_of
+from inercal.bench.workbench.pages.form import advice_of
 from inercal.examples import FOLDER
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source

@@ -36,7 +36,7 @@ from inercal.foundation.errors import InputError
 from inercal.systems.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
-    from inercal.systems.imu.temperature.model import TemperatureModel
+    from inercal.foundation.records.record import Record
 
 
 def _calibrating(kind: str) -> Callable[..., int]:
@@ -135,37 +135,21 @@ def temperature(
     output: ResultOutput = ResultOutput(),
 ) -> int:
     """Fit what a sensor's output or its calibration does with temperature."""
-    from dataclasses import replace
-
+    from inercal.faces.python.verbs import temperature as of_temperature
     from inercal.foundation.units import parse_quantity
-    from inercal.systems.imu.verbs import of_temperature
 
     reference = parse_quantity(at, "temperature", "--at").value
     output.check(WHOLE, (*files, map_file))
     clock = time.perf_counter()
+    given: Record | list[Path] = files
     if all(file.suffix.lower() in WHOLE for file in files):
         if map_file is not None:
             raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
         span.refuse("calibrations")
-        model, read_s = _of_calibrations(files, reference), time.perf_counter() - clock
     else:
-        from inercal.systems.imu.temperature.sweep import fit_recording
-
-        record = read_record(files, map_file, output, span)
-        read_s = time.perf_counter() - clock
-        model = fit_recording(record, reference)
-    solve_s = time.perf_counter() - clock - read_s
-    result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
-    return give(result, output, read_s, "temperature model")
-
-
-def _of_calibrations(files: list[Path], reference: float) -> TemperatureModel:
-    """The model of saved calibrations, in the order given."""
-    from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.files import load
-    from inercal.systems.imu.temperature.calibrations import fit_calibrations
-
-    return fit_calibrations([load(file) for file in files], [source_of(file) for file in files], reference)
+        given = read_record(files, map_file, output, span)
+    read_s = time.perf_counter() - clock
+    return give(of_temperature(given, reference), output, read_s, "temperature model")
 
 
 def selfcal(

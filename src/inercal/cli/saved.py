@@ -107,20 +107,13 @@ def compare(
     output: ResultOutput = ResultOutput(),
 ) -> int:
     """Compare two calibrations of one instrument."""
-    from inercal.faces.python.calibrations import of_comparison, read_estimate
-    from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.compare import Saved
-    from inercal.foundation.results.compare import compare as compared
+    from inercal.faces.python.calibrations import compare as compared
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
-    files = [Saved(read_estimate(path), str(path)) for path in (first, second)]
-    inputs = (source_of(first), source_of(second))
-    read = time.perf_counter()
-    estimate = compared(*files)
-    timing = {"solve": time.perf_counter() - read}
-    result = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate)
-    return give(result, output, read - clock, "comparison")
+    result = compared(first, second)
+    read_s = time.perf_counter() - clock - result.estimate.timing["solve"]
+    return give(result, output, read_s, "comparison")
 
 
 Tool = Literal["imu_tk", "imucal", "kalibr", "psins"]

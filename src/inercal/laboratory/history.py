@@ -29,19 +29,11 @@ from inercal.foundation.inference.variances import solved, weighed
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.results.shown import units_shown
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import Conformity, Specification, conformity, group_of
 from inercal.laboratory.wander import CalibrationSeries, Interval, Wandering, prior_of, wandering
 
 Mask: TypeAlias = NDArray[np.bool_]
-
-LIMIT = 3.0
-"""Limit of both charts, in standard deviations."""
-
-WEIGHT = 0.2
-"""Weight L of the newest deviation in the EWMA."""
-
-FIRST = 2
-"""Calibrations before the first that is judged: the scatter is not known from one."""
 
 _GRID = 40
 
@@ -64,7 +56,7 @@ class Chart:
     @property
     def alarms(self) -> Mask:
         """Calibrations (n,) outside the limits of the chart of individuals."""
-        return np.abs(self.z) > LIMIT
+        return np.abs(self.z) > LIMITS.chart_sigmas
 
     @property
     def drift_alarms(self) -> Mask:
@@ -74,24 +66,25 @@ class Chart:
 
 def chart(series: CalibrationSeries) -> Chart:
     """The control charts of a coefficient that should not change."""
-    n = len(series.y)
+    n, first, L = len(series.y), LIMITS.first_calibrations, LIMITS.ewma_weight
     centre, low, high, z = (np.full(n, np.nan) for _ in range(4))
-    if n > FIRST:
-        expected = [_expected(series, k) for k in range(FIRST, n)]
+    if n > first:
+        expected = [_expected(series, k) for k in range(first, n)]
         weights, means, sigmas = (np.array(each) for each in zip(*expected, strict=True))
-        below = (weights * ndtr((series.y[FIRST:, None] - means) / sigmas)).sum(axis=1)
+        below = (weights * ndtr((series.y[first:, None] - means) / sigmas)).sum(axis=1)
         with np.errstate(divide="ignore"):
-            z[FIRST:] = np.clip(ndtri(np.clip(below, 0.0, 1.0)), -40.0, 40.0)
-        centre[FIRST:] = (weights * means).sum(axis=1)
-        low[FIRST:], high[FIRST:] = (
-            _quantiles(weights, means, sigmas, float(ndtr(side * LIMIT))) for side in (-1.0, 1.0)
+            z[first:] = np.clip(ndtri(np.clip(below, 0.0, 1.0)), -40.0, 40.0)
+        centre[first:] = (weights * means).sum(axis=1)
+        low[first:], high[first:] = (
+            _quantiles(weights, means, sigmas, float(ndtr(side * LIMITS.chart_sigmas)))
+            for side in (-1.0, 1.0)
         )
     ewma, limit = np.full(n, np.nan), np.full(n, np.nan)
     smoothed = 0.0
-    for k in range(FIRST, n):
-        smoothed = (1.0 - WEIGHT) * smoothed + WEIGHT * z[k]
+    for k in range(first, n):
+        smoothed = (1.0 - L) * smoothed + L * z[k]
         ewma[k] = smoothed
-        limit[k] = LIMIT * np.sqrt(WEIGHT / (2.0 - WEIGHT) * (1.0 - (1.0 - WEIGHT) ** (2 * (k - FIRST + 1))))
+        limit[k] = LIMITS.chart_sigmas * np.sqrt(L / (2.0 - L) * (1.0 - (1.0 - L) ** (2 * (k - first + 1))))
     return Chart(centre, low, high, z, ewma, limit)
 
 
@@ -125,12 +118,6 @@ def _quantiles(weights: Array, means: Array, sigmas: Array, p: float) -> Array:
 YEAR = 365.25
 """Days."""
 
-HORIZON = 20.0
-"""Years in which the date of the next calibration is sought."""
-
-FAMILY = 0.05
-"""Probability of a verdict on the last calibration where nothing changed, over all coefficients and both charts."""
-
 REFERENCES = (
     "ISO 7870-2:2013 and 7870-6:2016, Control charts (individuals; EWMA)",
     "ILAC-G24:2022, Guidelines for the determination of recalibration intervals of measuring equipment",
@@ -147,7 +134,7 @@ class Course:
 
     ``dates`` (n) and ``ids`` of the calibrations, ``U`` (n,) expanded uncertainties, ``E_n`` (n,) between neighbours
     (NaN at the first), and, where there are enough calibrations, its ``wandering``, what it should be at the date that
-    was asked for, and the date at which it leaves its limits (None: not within `HORIZON`).
+    was asked for, and the date at which it leaves its limits (None: not within `Limits.horizon_years`).
     """
 
     name: str
@@ -306,7 +293,7 @@ def _due(wander: Wandering, limits: tuple[float, float], begin: date) -> date | 
         there = wander.at(t)
         return there.value - there.U < limits[0] or there.value + there.U > limits[1]
 
-    steps = last + np.concatenate([[0.0], np.geomspace(1.0 / 12.0, HORIZON, 30)])
+    steps = last + np.concatenate([[0.0], np.geomspace(1.0 / 12.0, LIMITS.horizon_years, 30)])
     found = next((i for i, t in enumerate(steps) if outside(float(t))), None)
     if found is None:
         return None
@@ -324,7 +311,7 @@ def _verdict(courses: Sequence[Course]) -> tuple[Status, str]:
     from scipy.special import ndtri
 
     judged = [course for course in courses if np.isfinite(course.chart.z[course.last])]
-    limit = -float(ndtri(FAMILY / max(4 * len(judged), 1)))  # both sides of both charts
+    limit = -float(ndtri(LIMITS.family_risk / max(4 * len(judged), 1)))  # both sides of both charts
     moved, drifted = [], []
     for course in judged:
         k = course.last

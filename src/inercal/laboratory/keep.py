@@ -28,10 +28,8 @@ from inercal.laboratory.database import (
     reading,
     writing,
 )
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.store import Store, digest_of, happened, now
-
-LARGE = 1 << 30
-"""Bytes beyond which a file is kept by reference: its path and SHA-256."""
 
 
 @dataclass(frozen=True)
@@ -282,7 +280,7 @@ def _files(
         place = without_secrets(source.path if "://" in source.path else str(path.absolute()))
         try:
             size = path.stat().st_size
-            if size > LARGE:
+            if size > LIMITS.whole_bytes:
                 rows.append({"sha256": source.sha256, "bytes": size, "place": place})
                 notes.append(f"{source.path}: {size / 2**30:.1f} GiB, kept by its path and checksum")
                 continue

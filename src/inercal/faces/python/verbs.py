@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +15,7 @@ from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Study, study, study_of
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.record import Record
-from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.system import SYSTEM as IMU
 from inercal.systems.listed import SYSTEMS
 
@@ -268,12 +270,12 @@ def _kinds_with(offer: str) -> str:
     return f"{', '.join(kinds)} or {last}" if kinds else last
 
 
-def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 25.0) -> Result:
+def temperature(given: Record | Sequence[Result | Estimate | str | Path], at: str | float = 25.0) -> Result:
     """Fit what a sensor's output, or its calibration, does with temperature.
 
     Parameters
     ----------
-    given : Record or sequence of Result
+    given : Record or sequence of Result or path
         A recording at rest over a sweep of temperature, or calibrations made at several, in the order of time.
     at : str or float
         Temperature about which the polynomial is written: ``"25 degC"``, or degrees Celsius.
@@ -303,12 +305,21 @@ def temperature(given: Record | Sequence[Result | Estimate], at: str | float = 2
     if isinstance(given, Record):
         from inercal.systems.imu.temperature.sweep import fit_recording
 
-        return of_temperature(fit_recording(given, about))
-    from inercal.systems.imu.temperature.calibrations import fit_calibrations
+        clock = time.perf_counter()
+        model = fit_recording(given, about)
+    else:
+        from inercal.foundation.records.read import source_of
+        from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
-    estimates = [estimate_of(each)[0] for each in given]
-    sources = [source for each in estimates for source in each.inputs[:1]]
-    return of_temperature(fit_calibrations(estimates, sources, about))
+        estimates = [estimate_of(each)[0] for each in given]
+        sources = [
+            source
+            for each, estimate in zip(given, estimates, strict=True)
+            for source in ([source_of(each)] if isinstance(each, str | Path) else estimate.inputs[:1])
+        ]
+        clock = time.perf_counter()
+        model = fit_calibrations(estimates, sources, about)
+    return of_temperature(replace(model, estimate=timed(model.estimate, clock)))
 
 
 def allan(record: Record) -> Result:

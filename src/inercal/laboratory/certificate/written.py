@@ -17,7 +17,7 @@ from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import shown
 from inercal.laboratory.certificate.elements import DCC, NAMESPACES, XSI, dcc, optional, plain, words
 from inercal.laboratory.certificate.lab import LabFile, joined, sources_known
-from inercal.laboratory.certificate.results import limits_used, measured, statement
+from inercal.laboratory.certificate.results import limits_used, measured, software, statement
 from inercal.laboratory.certificate.schema import VERSION, fault
 from inercal.laboratory.specification import Conformity, Specification, judged, specification_of
 
@@ -73,11 +73,6 @@ def administrative(
         _contact("customer", lab.customer),
         _statements(lab, conformity),
     )
-
-
-def software() -> _Element:
-    """The element of the software: this program."""
-    return dcc("software", words("name", "inercal"), dcc("release", __version__), dcc("type", "application"))
 
 
 def _definitions(types: Iterable[str]) -> _Element | None:

@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.laboratory.fleet.unit import FAILED, REFUSED, UnitRow
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import Specification
-
-LEVEL = 0.95
-"""Probability of the intervals of yield and capability."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +33,10 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of the interval of `LEVEL`."""
+        """Ends of the interval of `Limits.interval_level`."""
         from scipy.special import betaincinv
 
-        tail = 0.5 * (1.0 - LEVEL)
+        tail = 0.5 * (1.0 - LIMITS.interval_level)
         k, n = self.good, self.all
         low = 0.0 if k == 0 else float(betaincinv(k, n - k + 1, tail))
         high = 1.0 if k == n else float(betaincinv(k + 1, n - k, 1.0 - tail))
@@ -47,7 +45,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Index:
-    """An index of capability with the ends of its interval of `LEVEL`."""
+    """An index of capability with the ends of its interval of `Limits.interval_level`."""
 
     value: float
     low: float
@@ -88,7 +86,7 @@ class Spread:
         if self.limits is None or not self.scatter > 0.0:
             return None
         value = (self.limits[1] - self.limits[0]) / (6.0 * self.scatter)
-        dof, tail = len(self.values) - 1, 0.5 * (1.0 - LEVEL)
+        dof, tail = len(self.values) - 1, 0.5 * (1.0 - LIMITS.interval_level)
         low, high = (math.sqrt(float(chdtri(dof, upper)) / dof) for upper in (1.0 - tail, tail))
         return Index(value, value * low, value * high)
 
@@ -102,7 +100,9 @@ class Spread:
         low, high = self.limits
         value = min(high - self.mean, self.mean - low) / (3.0 * self.scatter)
         n = len(self.values)
-        half = float(ndtri(0.5 * (1.0 + LEVEL))) * math.sqrt(1.0 / (9.0 * n) + value**2 / (2.0 * (n - 1)))
+        half = float(ndtri(0.5 * (1.0 + LIMITS.interval_level))) * math.sqrt(
+            1.0 / (9.0 * n) + value**2 / (2.0 * (n - 1))
+        )
         return Index(value, value - half, value + half)
 
     def trend(self, at: Array) -> tuple[float, float] | None:
@@ -143,15 +143,6 @@ def _spread(
     )
 
 
-RISK = 0.05
-"""Probability that a sound fleet has any unit named."""
-
-FEWEST = 10
-"""Units below which none can be told to be strange."""
-
-_CORE = 0.75
-"""Share of the units that the scatter is of."""
-
 _FLEETS = 200
 _MANY = 200
 """Units from which on the simulated fleets are no larger."""
@@ -169,7 +160,7 @@ def distances(values: Array) -> Array:
     if not _joint(*z.shape):
         farthest: Array = np.abs(z).max(axis=1)
         return farthest
-    size = int(_CORE * len(z))
+    size = int(LIMITS.core_share * len(z))
     norm = np.linalg.norm(z, axis=1, keepdims=True)
     signs = z / np.where(norm > 0.0, norm, 1.0)
     turned = z @ np.linalg.eigh(signs.T @ signs)[1]
@@ -187,7 +178,7 @@ def standardised(values: Array) -> Array:
 
 def _joint(units: int, coefficients: int) -> bool:
     """True if the units are enough for the covariance of the coefficients."""
-    return units >= max(FEWEST, 3 * coefficients)
+    return units >= max(LIMITS.fewest_units, 3 * coefficients)
 
 
 def _concentrated(z: Array, core: NDArray[np.intp]) -> tuple[Array, float]:
@@ -205,7 +196,7 @@ def _concentrated(z: Array, core: NDArray[np.intp]) -> tuple[Array, float]:
 
 
 def limit(units: int, coefficients: int) -> float:
-    """The distance that the farthest of so many sound units exceeds with the probability `RISK`."""
+    """The distance that the farthest of so many sound units exceeds with the probability `Limits.strange_risk`."""
     from scipy.special import chdtri
 
     found = _limit(min(units, _MANY), coefficients)
@@ -213,7 +204,7 @@ def limit(units: int, coefficients: int) -> float:
         return found
     # the distribution of many units is that of chi-square: its quantiles say how much farther the farthest of more lies
     p = coefficients if _joint(units, coefficients) else 1
-    far = [float(chdtri(p, -np.expm1(np.log1p(-RISK) / n))) for n in (units, _MANY)]
+    far = [float(chdtri(p, -np.expm1(np.log1p(-LIMITS.strange_risk) / n))) for n in (units, _MANY)]
     return found * float(np.sqrt(far[0] / far[1]))
 
 
@@ -222,11 +213,7 @@ def _limit(units: int, coefficients: int) -> float:
     """The limit, by simulated fleets."""
     rng = np.random.default_rng(20261123)
     farthest = [distances(rng.standard_normal((units, coefficients))).max() for _ in range(_FLEETS)]
-    return float(np.quantile(farthest, 1.0 - RISK))
-
-
-TREND_RISK = 0.01
-"""Probability that a fleet without any trend has one named."""
+    return float(np.quantile(farthest, 1.0 - LIMITS.strange_risk))
 
 
 @dataclass(frozen=True)
@@ -357,11 +344,11 @@ def _times(rows: Sequence[UnitRow]) -> tuple[Array, str]:
 
 
 def _trends(found: Sequence[Spread], at: Array) -> tuple[Trend, ...]:
-    """Coefficients with a trend, at a risk over all of `TREND_RISK`."""
+    """Coefficients with a trend, at a risk over all of `Limits.trend_risk`."""
     trends = []
     for spread in found:
         trend = spread.trend(at)
-        if trend is not None and trend[1] < TREND_RISK / len(found):
+        if trend is not None and trend[1] < LIMITS.trend_risk / len(found):
             trends.append(Trend(spread.name, trend[0], spread.unit, trend[1]))
     return tuple(sorted(trends, key=lambda each: each.p))
 
@@ -373,7 +360,7 @@ def _strange(found: Sequence[Spread]) -> tuple[tuple[Strange, ...], float]:
     most = max(len(spread.places) for spread in found)
     usual = [spread for spread in found if 2 * len(spread.places) > most]
     places = sorted(set.intersection(*(set(spread.places) for spread in usual)))
-    if len(places) < FEWEST:
+    if len(places) < LIMITS.fewest_units:
         return (), math.nan
     by_place = [dict(zip(spread.places, spread.values, strict=True)) for spread in usual]
     values = np.array([[own[place] for own in by_place] for place in places])

@@ -11,8 +11,8 @@ import numpy as np
 from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.form import lines_of, named, with_found, with_lines
 from inercal.bench.workbench.jobs import Job, JobState
+from inercal.bench.workbench.pages.form import lines_of, named, with_found, with_lines
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,

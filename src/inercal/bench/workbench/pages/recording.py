@@ -16,7 +16,7 @@ from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench, Looked
 from inercal.bench.workbench.charts import Notes, course_figure, spans_of
-from inercal.bench.workbench.form import Widget, as_toml
+from inercal.bench.workbench.pages.form import Widget, as_toml
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,

@@ -10,8 +10,8 @@ from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
 from inercal.bench.workbench.charts import parts_of, residual_figure, span_of
-from inercal.bench.workbench.form import Advice, advice_of
 from inercal.bench.workbench.jobs import Job, JobState
+from inercal.bench.workbench.pages.form import Advice, advice_of
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,
