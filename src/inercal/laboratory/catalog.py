@@ -32,6 +32,10 @@ SHORT = 10
 """Digits of an identity that are shown."""
 
 
+_OWN = ("id", "command", "status", "message", "made", "measured", "operator", "version")
+"""Columns of a result that a list has."""
+
+
 @dataclass(frozen=True)
 class Listed:
     """A result in a list: its row, instrument, and the identity of the one that supersedes it."""
@@ -118,19 +122,8 @@ def _listed() -> Any:
     """The query of all results."""
     return (
         select(
-            StoredResult.id,
-            StoredResult.command,
-            StoredResult.status,
-            StoredResult.message,
-            StoredResult.made,
-            StoredResult.measured,
-            StoredResult.operator,
-            StoredResult.version,
-            StoredInstrument.maker,
-            StoredInstrument.model,
-            StoredInstrument.serial,
-            StoredInstrument.owner,
-            StoredInstrument.kind,
+            *(StoredResult.__table__.c[name] for name in _OWN),
+            *(StoredInstrument.__table__.c[name] for name in ("maker", "model", "serial", "owner", "kind")),
             Supersession.by_id,
         )
         .outerjoin(StoredInstrument, StoredInstrument.id == StoredResult.instrument_id)
@@ -145,13 +138,12 @@ def _row(row: Any, where: str) -> Listed:
         if row["serial"] is None
         else Item(row["maker"], row["model"], row["serial"], row["owner"], row["kind"])
     )
-    own = ("id", "command", "status", "message", "made", "measured", "operator", "version")
-    if any(row[key] is None for key in own):
+    if any(row[key] is None for key in _OWN):
         raise InputError(
             where,
             "a row of the results was damaged, expected one as it was written: see `inercal store check`",
         )
-    return Listed(**{key: row[key] for key in own}, instrument=item, superseded_by=row["by_id"])
+    return Listed(**{key: row[key] for key in _OWN}, instrument=item, superseded_by=row["by_id"])
 
 
 def numbers_of(store: Store, name: str) -> list[int]:
@@ -265,20 +257,8 @@ def values_of(store: Store, instrument: str) -> list[dict[str, Any]]:
     """All coefficients of an instrument's results that nothing supersedes, a row each, in the order of dates."""
     query = (
         select(
-            StoredResult.id,
-            StoredResult.command,
-            StoredResult.status,
-            StoredResult.made,
-            StoredResult.measured,
-            StoredCoefficient.position,
-            StoredCoefficient.name,
-            StoredCoefficient.value,
-            StoredCoefficient.u,
-            StoredCoefficient.expanded,
-            StoredCoefficient.k,
-            StoredCoefficient.dof,
-            StoredCoefficient.unit,
-            StoredCoefficient.common,
+            *(StoredResult.__table__.c[name] for name in ("id", "command", "status", "made", "measured")),
+            *(column for column in StoredCoefficient.__table__.c if column.name != "result_id"),
         )
         .join(StoredCoefficient, StoredCoefficient.result_id == StoredResult.id)
         .outerjoin(Supersession, Supersession.result_id == StoredResult.id)

@@ -6,7 +6,7 @@ bytes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,6 +23,8 @@ from sqlalchemy import (
     UniqueConstraint,
     create_engine,
     event,
+    insert,
+    select,
     text,
 )
 from sqlalchemy.engine import make_url
@@ -56,11 +58,18 @@ class Setting(Tables):
     value: Mapped[Words]
 
 
+NAMES = {
+    "instrument": ("maker", "model", "serial"),
+    "reference": ("name", "serial", "certificate", "valid_until"),
+}
+"""Columns by which the rows of a table are told apart."""
+
+
 class StoredInstrument(Tables):
     """An instrument that is calibrated."""
 
     __tablename__ = "instrument"
-    __table_args__ = (UniqueConstraint("maker", "model", "serial"), {"sqlite_strict": True})
+    __table_args__ = (UniqueConstraint(*NAMES["instrument"]), {"sqlite_strict": True})
     id: Mapped[int] = mapped_column(primary_key=True)
     maker: Mapped[Words]
     model: Mapped[Words]
@@ -75,7 +84,7 @@ class StoredReference(Tables):
 
     __tablename__ = "reference"
     __table_args__ = (
-        UniqueConstraint("name", "serial", "certificate", "valid_until"),
+        UniqueConstraint(*NAMES["reference"]),
         {"sqlite_strict": True},
     )
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -341,3 +350,16 @@ def migrate(engine: Engine, where: str, version: str = VERSION) -> None:
     with writing(engine, where) as connection:
         config.attributes["connection"] = connection
         command.upgrade(config, version)
+
+
+def numbered(
+    connection: Connection, table: type[StoredInstrument | StoredReference], row: Mapping[str, Any]
+) -> int:
+    """The primary key of an instrument or a reference with the names of ``row``; a new one is added."""
+    columns = table.__table__.columns
+    same = [columns[key] == row[key] for key in NAMES[table.__tablename__]]
+    number: int | None = connection.execute(select(columns["id"]).where(*same)).scalar()
+    if number is None:
+        own = {key: value for key, value in row.items() if key != "id"}
+        number = connection.execute(insert(table).values(**own).returning(columns["id"])).scalar_one()
+    return number

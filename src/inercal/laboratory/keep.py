@@ -25,6 +25,7 @@ from inercal.laboratory.database import (
     StoredReference,
     StoredResult,
     Used,
+    numbered,
     reading,
     writing,
 )
@@ -150,7 +151,7 @@ def keep(
     with writing(store.engine, store.where) as connection:
         if connection.execute(select(StoredResult.id).where(StoredResult.id == identity)).first():
             return KeptResult(identity, False)
-        number = None if item is None else _instrument(connection, item)
+        number = None if item is None else numbered(connection, StoredInstrument, {**vars(item), "notes": ""})
         for file in files:
             if not connection.execute(select(StoredFile).where(StoredFile.sha256 == file["sha256"])).first():
                 connection.execute(insert(StoredFile).values(**file))
@@ -235,39 +236,11 @@ def add_rows(connection: Connection, rows: StoredRows, instrument_id: int | None
         for i, (sha256, path) in enumerate(rows.sources)
     ]
     coefficients = [{"result_id": identity, "position": i, **row} for i, row in enumerate(rows.coefficients)]
-    numbers = dict.fromkeys(_reference(connection, row) for row in rows.references)
+    numbers = dict.fromkeys(numbered(connection, StoredReference, row) for row in rows.references)
     used = [{"result_id": identity, "reference_id": number} for number in numbers]
     for table, values in ((SourceOf, sources), (StoredCoefficient, coefficients), (Used, used)):
         if values:
             connection.execute(insert(table), values)
-
-
-def _instrument(connection: Connection, item: Item) -> int:
-    """The primary key of an instrument; a new instrument is added."""
-    same = (
-        StoredInstrument.maker == item.maker,
-        StoredInstrument.model == item.model,
-        StoredInstrument.serial == item.serial,
-    )
-    number = connection.execute(select(StoredInstrument.id).where(*same)).scalar()
-    if number is None:
-        values = {"kind": item.kind, "owner": item.owner, "notes": ""}
-        row = {"maker": item.maker, "model": item.model, "serial": item.serial, **values}
-        number = connection.execute(
-            insert(StoredInstrument).values(**row).returning(StoredInstrument.id)
-        ).scalar_one()
-    return number
-
-
-def _reference(connection: Connection, row: Mapping[str, str]) -> int:
-    """The primary key of a reference; a new reference is added."""
-    same = (getattr(StoredReference, key) == row[key] for key in row)
-    number = connection.execute(select(StoredReference.id).where(*same)).scalar()
-    if number is None:
-        number = connection.execute(
-            insert(StoredReference).values(**row).returning(StoredReference.id)
-        ).scalar_one()
-    return number
 
 
 def _files(

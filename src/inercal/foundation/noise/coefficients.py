@@ -65,9 +65,11 @@ def noise_coefficients(
     channel: int = 0,
     *,
     terms: tuple[str, ...] = SYMBOLS,
-    fit_range: tuple[float, float] | None = None,
 ) -> NoiseCoefficients:
     """Fit the noise of one channel and report the terms that it shows.
+
+    All averaging times are fitted; where the noise of short means is not of the kinds looked for (filters and dither
+    shape it), those from the shortest from which it is.
 
     Parameters
     ----------
@@ -77,15 +79,11 @@ def noise_coefficients(
         Column of it.
     terms : tuple of str, optional
         Terms looked for, of N, B, K, R, Q.
-    fit_range : (float, float), optional
-        Shortest and longest averaging time [s] to be fitted. By default all; where the noise of short means is not
-        of the kinds looked for (filters and dither shape it), from the shortest averaging time from which it is.
 
     Raises
     ------
     InputError
-        Fewer than `Limits.fewest_times` averaging times apart by `Limits.spacing_ratio` in the range stated, or
-        unknown terms.
+        Unknown terms, or none.
 
     Notes
     -----
@@ -102,14 +100,8 @@ def noise_coefficients(
         expected = ", ".join(SYMBOLS)
         raise InputError("terms", f"found {', '.join(unknown) or 'none'}, expected some of {expected}")
     columns = [i for i, symbol in enumerate(SYMBOLS) if symbol in terms]
-    rows = _rows(deviation, channel, fit_range)
+    rows = _rows(deviation, channel)
     if len(rows) < LIMITS.fewest_times:
-        if fit_range is not None:
-            raise InputError(
-                "fit_range",
-                f"found {len(rows)} averaging times to fit from {fit_range[0]:g} s to {fit_range[1]:g} s, expected "
-                f"at least {LIMITS.fewest_times}, each {LIMITS.spacing_ratio:g} times the one before",
-            )
         few = (
             f"there are fewer than {LIMITS.fewest_times} averaging times with a deviation above zero: "
             "no noise was fitted"
@@ -126,7 +118,7 @@ def noise_coefficients(
             deviation.samples, gain[:, _N], gain[:, _Q]
         ),
     )
-    tried = _tried(whole, columns, cut=fit_range is None)
+    tried = _tried(whole, columns)
     if not tried:
         line = "the output is a ramp without noise of the kinds looked for: none was fitted"
         return _nothing(deviation, terms, Finding("noise_misfit", line))
@@ -145,25 +137,24 @@ def noise_coefficients(
     return NoiseCoefficients(names, values, covariance, dof, bounds, span, chi2, chi2_dof, findings)
 
 
-def _rows(deviation: AllanDeviation, channel: int, fit_range: tuple[float, float] | None) -> list[int]:
-    """Averaging times to fit: known, within the range, and well apart."""
-    low, high = fit_range or (0.0, np.inf)
+def _rows(deviation: AllanDeviation, channel: int) -> list[int]:
+    """Averaging times to fit: known, and well apart."""
     rows: list[int] = []
     for row, (tau, value) in enumerate(zip(deviation.tau, deviation.deviation[:, channel], strict=True)):
         apart = not rows or tau >= (LIMITS.spacing_ratio - 1e-9) * deviation.tau[rows[-1]]
-        if value > 0.0 and apart and low * (1.0 - 1e-9) <= tau <= high * (1.0 + 1e-9):
+        if value > 0.0 and apart:
             rows.append(row)
     return rows
 
 
-def _tried(whole: AllanCurve, columns: list[int], cut: bool) -> list[tuple[AllanCurve, Array, float, int]]:
-    """Curves, from the whole to ever later starts if ``cut`` is allowed, with squares and misfit; the last may fit."""
+def _tried(whole: AllanCurve, columns: list[int]) -> list[tuple[AllanCurve, Array, float, int]]:
+    """Curves, from the whole to ever later starts, with squares and misfit; the last may fit."""
     tried = []
     curve, squares = whole, whole.squares(columns)
     while squares is not None:
         chi2, dof = curve.misfit(squares)
         tried.append((curve, squares, chi2, dof))
-        if not (cut and _improbable(chi2, dof)) or len(curve.variances) <= LIMITS.fewest_kept:
+        if not _improbable(chi2, dof) or len(curve.variances) <= LIMITS.fewest_kept:
             break
         curve = curve.without_first()
         squares = curve.squares(columns)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.faces.report import innovations as white_noise
+from inercal.faces.report import courses as white_noise
 from inercal.faces.report.courses import CoefficientCourse, converging, falling
 from inercal.faces.report.html import Picture
 from inercal.foundation.arrays import Array
