@@ -56,16 +56,16 @@ Map, lower floors first; each imports only from those above its own line
     findings, units            what is said of a recording or result, and the verdict; texts with units
     keys                       what a study says of a field of settings: key, unit, default, bounds, meaning
     geometry                   rotations, earth, site
-    instruments                terms, triad, polynomial, by_angle, noise
+    instruments                terms, triad, polynomial, by_angle, noise, dsi
     records                    record, column, channels, maps, read, write, checks, dwells
-    rigs                       chain, distribution, tables, plans, outputs
-    computing                  runs, executors, cluster, checkpoint
-    inference                  least_squares, variances, consistency, coverage, identifiability, hypotheses, effects;
-                               kernels: factor, sigma_point, kalman
-    results                    result, basis, budget, files, remarks, repeat, compare, formula, table
+    rigs                       chain, patterns, tables, plans, outputs
+    computing                  runs, executors, cluster
+    inference                  least_squares, variances, consistency, identifiability, hypotheses, effects; kernels:
+                               sigma_point, kalman
+    results                    result, basis, budget, files, remarks, repeat, compare, shown
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
-    designs                    candidates, criteria, exchange, search, comparison
+    designs                    criteria, exchange, search, tolerances, foresight
 
     examples                   recordings that ship
 
@@ -87,14 +87,14 @@ Map, lower floors first; each imports only from those above its own line
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     python                     the verbs of Python, and the results that they give back
 
-    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
-    fleet                      many units of one make: batch, capability, outliers
+    laboratory                 results kept in a store: database, keep, catalog, check; history, certificates
+    fleet                      many units of one make: manifest, unit, batch, fleet
 
     bench: a measurement while it runs, and the commands in a browser
     live                       an instrument by wire: sources, frames, sinks, a measurement that runs
     workbench                  sessions, jobs, a page each, REST
 
-    cli                        one module per verb
+    cli                        a module for each command or family of them
 """
 
 from typing import TYPE_CHECKING

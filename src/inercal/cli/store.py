@@ -278,7 +278,7 @@ def supersede(
 ) -> None:
     """Say that a result takes the place of another."""
     from inercal.laboratory.catalog import SHORT
-    from inercal.laboratory.issue import supersede as superseded
+    from inercal.laboratory.catalog import supersede as superseded
     from inercal.laboratory.store import open_store
 
     old, new = superseded(open_store(store), identity, by, reason)

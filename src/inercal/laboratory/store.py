@@ -1,8 +1,7 @@
 """A store: made, opened, brought to the version of today.
 
-The place of a store: a folder with ``store.db`` and ``objects``, or the URL of a database.
-
-Events of a store: a chain of hashes, so that whoever changes a row later is found out.
+It lies in a folder with ``store.db`` and ``objects``, or in a database by its URL. Its events are a chain of hashes, so
+that whoever changes a row later is found out.
 """
 
 from __future__ import annotations

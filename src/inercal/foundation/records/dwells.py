@@ -1,9 +1,8 @@
-"""Static intervals of a recording: where the instrument was held still.
+"""Static intervals of a recording, in which the instrument was held still.
 
-Windowed variance against a multiple of the variance of an initial static period (Tedaldi, Pretto,
-Menegatti, ICRA 2014, section IV-A).
-
-Stretches of a recording in which nothing moves, found coarsely: to look at, not to calibrate by.
+A calibration finds them by the variance in a window, against a multiple of that of an initial static period (Tedaldi,
+Pretto, Menegatti, ICRA 2014, section IV-A). `quiet` finds them coarsely, of any recording: to look at, not to calibrate
+by.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""All units of a manifest calibrated: on many processors, going on where an earlier run stopped.
+"""All units of a manifest calibrated, on many processors, from where an earlier run stopped.
 
-The table of a fleet as files: a row for each unit, in CSV and Parquet.
+The outcome is a folder: a table with a row for each unit in CSV and Parquet, a page, a result, and the result of each
+unit.
 """
 
 from __future__ import annotations
