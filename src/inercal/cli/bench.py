@@ -111,19 +111,15 @@ def _estimator(
 
 def _check(source: Path | None, record: Path | None, sinks: list[Sink]) -> None:
     """Refuse one place for two things; raises `InputError`."""
-    files = [each for each in (source, record, *(_place(sink) for sink in sinks)) if each is not None]
+    from inercal.bench.live.address import target
+
+    files = [each for each in (source, record, *map(target, sinks)) if each is not None]
     names = [realpath(each) for each in files]
     for place, name in zip(files, names, strict=True):
         if names.count(name) > 1:
             raise InputError(place, "found it for two things, expected a name for each")
     if len(set(map(str, sinks))) < len(sinks):
         raise InputError("--to", "found a sink twice, expected each once")
-
-
-def _place(sink: Sink) -> Path | None:
-    """The file or folder of a sink."""
-    place: Path | None = getattr(sink, "file", None) or getattr(sink, "folder", None)
-    return place
 
 
 def _followed(measurement: RunningMeasurement, output: OutputOptions) -> int:

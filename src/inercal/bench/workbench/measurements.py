@@ -12,11 +12,11 @@ import shutil
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.bench.live.address import Mqtt, PieceFolder, Replay, Sink, Source, Text, sink_of, source_of
+from inercal.bench.live.address import Sink, placed, sink_of, source_of, target
 from inercal.bench.live.feed import frame_of
 from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement
 from inercal.bench.workbench.sessions import MAP, STUDY, Session, Sessions, safe_name
@@ -235,11 +235,19 @@ def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
     study = read_study(session.kind, session.study)
     folder = session.folder / FOLDER
     typed = [sink_of(each) for each in wish.to]
-    source = _own_source(source_of(wish.source), session.folder)
-    sinks = [_own_sink(each, session.folder) for each in typed]
+    if "text:-" in map(str, typed):
+        raise InputError("to", "found text:-, expected a file, for a page has no standard output")
+
+    def read(path: Path) -> Path:
+        return _there(path, session.folder)
+
+    def written(path: Path) -> Path:
+        return folder / _plain(path)
+
+    source = placed(source_of(wish.source), read, written)
+    sinks = [placed(sink, read, written) for sink in typed]
     recording = folder / safe_name(wish.record) if wish.record else None
-    places = [recording, *(getattr(each, "file", None) or getattr(each, "folder", None) for each in sinks)]
-    names = [place for place in places if place is not None]
+    names = [place for place in (recording, *map(target, sinks)) if place is not None]
     if len(set(names)) < len(names) or len(set(map(str, sinks))) < len(sinks):
         raise InputError("to", "found one place for two things, expected a name for each")
     for place in names:
@@ -256,23 +264,6 @@ def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
     return WishedMeasurement(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
 
 
-def _own_source(source: Source, folder: Path) -> Source:
-    """The source with its files in the folder of the session; raises `InputError` for a file elsewhere."""
-    match source:
-        case Replay():
-            return replace(source, file=_there(source.file, folder))
-        case Mqtt():
-            return _own_broker(source, folder)
-        case _:
-            return source
-
-
-def _own_broker(broker: Mqtt, folder: Path) -> Mqtt:
-    """The topic with its files in the folder of the session."""
-    ca, login = (None if path is None else _there(path, folder) for path in (broker.ca, broker.login))
-    return replace(broker, ca=ca, login=login)
-
-
 def _there(path: Path, folder: Path) -> Path:
     """A file of the session, or of its folder ``live``; raises `InputError`."""
     name = path.name
@@ -281,21 +272,6 @@ def _there(path: Path, folder: Path) -> Path:
             if str(path) == typed and safe_name(name) == name and (place / name).is_file():
                 return place / name
     raise InputError(str(path), "is no file of this session, expected the name of one that was added to it")
-
-
-def _own_sink(sink: Sink, folder: Path) -> Sink:
-    """The sink with its file or folder in the folder ``live`` of the session; raises `InputError`."""
-    match sink:
-        case Text(file=None):
-            raise InputError("to", "found text:-, expected a file, for a page has no standard output")
-        case Text(file=Path() as file):
-            return Text(folder / FOLDER / _plain(file))
-        case PieceFolder():
-            return replace(sink, folder=folder / FOLDER / _plain(sink.folder))
-        case Mqtt():
-            return _own_broker(sink, folder)
-        case _:
-            return sink
 
 
 def _plain(path: Path) -> str:
@@ -311,7 +287,7 @@ def _command(session: Session, wish: Wish, sinks: Sequence[Sink], recording: Pat
     words += ["--map", MAP] if session.map is not None else []
     words += ["--record", f"{FOLDER}/{recording.name}"] if recording is not None else []
     for typed, sink in zip(wish.to, sinks, strict=True):
-        own = isinstance(sink, Text | PieceFolder)
+        own = target(sink) is not None
         words += ["--to", typed.replace(":", f":{FOLDER}/", 1) if own else typed]
     words += ["--every", f"{wish.every:g} s"] if wish.every else []
     return shlex.join(words)
