@@ -24,7 +24,7 @@ from inercal.bench.workbench.charts import course_figure
 from inercal.bench.workbench.pages.form import named
 from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
-from inercal.faces.python.study import course, foresight, read_study
+from inercal.faces.python.study import foresight, read_study, verticals
 from inercal.faces.studies.text import with_keys
 from inercal.systems.listed import SYSTEMS
 
@@ -108,7 +108,7 @@ def sliders(folder: Path, rounds: int) -> list[Row]:
             again = read_study(kind, path)
             made = foresight(again)
             made.u(np.ones(len(made.levers)))
-            course(again)
+            verticals(again)
 
         works = {"slider": lambda held=held, factors=factors: held.u(factors), "plan edited": edited}
         size = f"{kind}, {len(held.names)} values"
