@@ -130,11 +130,18 @@ _WHERE = {
     name: f"inercal.{module}"
     for module, names in {
         "faces.python.calibrations": ("apply", "compare", "load"),
-        "faces.python.noise": ("allan",),
         "faces.python.recordings": ("read", "record"),
         "faces.python.result": ("Result",),
         "faces.python.study": ("Study", "study"),
-        "faces.python.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
+        "faces.python.verbs": (
+            "allan",
+            "calibrate",
+            "design",
+            "runs",
+            "sensitivity",
+            "simulate",
+            "temperature",
+        ),
         "foundation.errors": ("CalibrationError", "InputError"),
         "foundation.records.record": ("Record",),
         "foundation.results.result": ("Estimate",),
