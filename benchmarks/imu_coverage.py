@@ -17,7 +17,7 @@ from campaigns import imu as by_hand
 from campaigns.places import add_options, in_words, place_of, progress
 
 from inercal.foundation.computing.runs import run
-from inercal.foundation.inference.coverage import coverage
+from inercal.foundation.inference.consistency import coverage
 from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.systems.imu.aided.coefficients import circumstances_of, names_of
 from inercal.systems.imu.ferraris.method import NAMES

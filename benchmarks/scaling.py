@@ -33,8 +33,7 @@ import sensitivity
 from inercal.examples import FOLDER
 from inercal.faces.report.style import COLOURS, figure, powers_of_ten, svg
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.foundation.designs.candidates import NAMES, Candidates, basis
-from inercal.foundation.designs.criteria import D
+from inercal.foundation.designs.criteria import NAMES, Candidates, D, basis
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.noise.deviation import allan_deviation

@@ -15,7 +15,7 @@ import numpy as np
 from campaigns.places import add_options, answers, in_words
 from campaigns.rig import SEED, Calibration, posed
 
-from inercal.foundation.inference.coverage import coverage, nees
+from inercal.foundation.inference.consistency import coverage, nees
 from inercal.systems.selfcal.platform.states import ADDED, RIG
 
 

@@ -19,8 +19,8 @@ from SALib.sample import sobol as salib_sample
 from scipy.stats import qmc
 
 from inercal.foundation.rigs.chain import Chain, Joint
-from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities.exact import analyse

@@ -68,7 +68,7 @@ def read(name, path, folder):
 
         return {"values": estimate_of_certificate(path).values}, set()
     if name == "checkpoint":
-        from inercal.foundation.computing.checkpoint import load as load_state
+        from inercal.faces.stream.checkpoint import load as load_state
 
         like = {"x": np.zeros(1), "n": 0}
         state = load_state(path, "test", "same", like)

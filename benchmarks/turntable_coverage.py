@@ -12,12 +12,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from campaigns.places import add_options, in_words, place_of, progress
 
-from inercal.faces.validate.gyrowheel import (
+from inercal.faces.validate.table import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
 from inercal.foundation.computing.runs import run
-from inercal.foundation.inference.coverage import coverage, nees
+from inercal.foundation.inference.consistency import coverage, nees
 from inercal.foundation.instruments.by_angle import EXTRA, channel_model
 
 SEED = 20261121

@@ -20,12 +20,11 @@ import orjson
 from measure import PROCESSOR, WALL, Row, Spread, alone, in_turn, row
 
 from inercal.bench.workbench.bench import Bench, open_bench
-from inercal.bench.workbench.charts import figure
-from inercal.bench.workbench.plans import named
+from inercal.bench.workbench.charts import course_figure
+from inercal.bench.workbench.pages.form import named
 from inercal.bench.workbench.sessions import STUDY
 from inercal.examples import FOLDER
-from inercal.faces.python.beginning import course, foresight
-from inercal.faces.python.study import read_study
+from inercal.faces.python.study import foresight, read_study, verticals
 from inercal.faces.studies.text import with_keys
 from inercal.systems.listed import SYSTEMS
 
@@ -76,7 +75,7 @@ def looked(bench: Bench, count: int, rounds: int) -> list[Row]:
     (held,) = bench.look(session)
 
     def zoom(begin: float, end: float) -> int:
-        return len(orjson.dumps(figure(held.courses, (begin, end), held.notes)))
+        return len(orjson.dumps(course_figure(held.courses, (begin, end), held.notes)))
 
     whole = float(channels["t [s]"][-1])
     middle = 0.4 * whole
@@ -109,7 +108,7 @@ def sliders(folder: Path, rounds: int) -> list[Row]:
             again = read_study(kind, path)
             made = foresight(again)
             made.u(np.ones(len(made.levers)))
-            course(again)
+            verticals(again)
 
         works = {"slider": lambda held=held, factors=factors: held.u(factors), "plan edited": edited}
         size = f"{kind}, {len(held.names)} values"

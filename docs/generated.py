@@ -24,6 +24,8 @@ from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
+import inercal
+
 Schema = Mapping[str, Any]
 
 #: stands for a colon while napoleon, which would take a type for what is before it, looks at a property
@@ -291,8 +293,8 @@ def _terms(found: Iterable[Any]) -> str:
 
 def reference_types() -> str:
     """The reference types of certificates."""
-    from inercal.foundation.instruments.reference_types import OTHERS
-    from inercal.foundation.instruments.reference_types import reference_types as types
+    from inercal.foundation.instruments.dsi import OTHERS
+    from inercal.foundation.instruments.dsi import reference_types as types
 
     rows = [(code(kind), meaning, code(unit)) for kind, (meaning, unit) in types().items()]
     return table(
@@ -304,13 +306,15 @@ def reference_types() -> str:
 
 
 def limits() -> str:
-    """The limits of every system, and of rooms in it that have their own, a table for each."""
-    from inercal import systems
-
-    parts = []
-    for path in sorted(Path(systems.__file__).parent.rglob("limits.py")):
-        room = ".".join(path.parent.relative_to(Path(systems.__file__).parent).parts)
-        module = import_module(f"inercal.systems.{room}.limits")
+    """The limits of every room that has some, a table for each; those of the systems first."""
+    package, parts = Path(inercal.__file__).parent, []
+    paths = [
+        path for path in package.rglob("limits.py") if "class Limits" in path.read_text(encoding="utf-8")
+    ]
+    for path in sorted(paths, key=lambda path: (path.parts[len(package.parts)] != "systems", path)):
+        rooms = path.parent.relative_to(package).parts
+        room = ".".join(rooms[1:] or rooms)
+        module = import_module(f"inercal.{'.'.join(rooms)}.limits")
         meanings = _meanings(path.read_text(encoding="utf-8"), type(module.LIMITS).__name__)
         rows = [(code(name), *_value(value, meanings[name])) for name, value in vars(module.LIMITS).items()]
         parts.append(f"## {room}\n\n" + table(("limit", "value", "meaning"), rows))

@@ -59,7 +59,7 @@ def helpers() -> dict[str, Path]:
 
 
 def imported(tree: ast.Module, modules: dict[str, Path]) -> set[str]:
-    """Those of the modules that a module names: in any import, or in a text such as `inercal.cli.new:new_imu`."""
+    """Those of the modules that a module names: in any import, or in a text such as `inercal.cli.package:new_imu`."""
     found = set()
     for node in ast.walk(tree):
         match node:

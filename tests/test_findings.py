@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import inercal
-from inercal.bench.workbench.advice import Advice, advice_of
+from inercal.bench.workbench.pages.form import Advice, advice_of
 from inercal.cli.options import OutputOptions, ReportOutput
 from inercal.cli.outcome import say_findings
 from inercal.faces.report.html import render

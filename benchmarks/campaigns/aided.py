@@ -8,7 +8,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.instruments.triad import TriadModel
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.imu.aided.calibration import calibrate_aided
 from inercal.systems.imu.aided.simulate import AidedTruth, Program, simulate

@@ -129,7 +129,7 @@ def drawn(method, rng):
 
 
 def _one(method, rng):
-    """The errors of one draw, for `inercal.foundation.inference.coverage`."""
+    """The errors of one draw, for `inercal.foundation.inference.consistency`."""
     truth, estimate = drawn(method, rng)
     return {
         "error": estimate.values - truth,

@@ -278,7 +278,7 @@ def certificate():
 
 def checkpoint():
     """The state of a stream."""
-    from inercal.foundation.computing.checkpoint import save
+    from inercal.faces.stream.checkpoint import save
 
     with tempfile.TemporaryDirectory() as folder:
         save(Path(folder, "a"), "test", "same", {"x": VALUES["acc_x"], "n": 3})

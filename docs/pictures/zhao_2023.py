@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import averages, exact

@@ -56,16 +56,16 @@ Map, lower floors first; each imports only from those above its own line
     findings, units            what is said of a recording or result, and the verdict; texts with units
     keys                       what a study says of a field of settings: key, unit, default, bounds, meaning
     geometry                   rotations, earth, site
-    instruments                terms, triad, polynomial, by_angle, noise
+    instruments                terms, triad, polynomial, by_angle, noise, dsi
     records                    record, column, channels, maps, read, write, checks, dwells
-    rigs                       chain, distribution, tables, plans, outputs
-    computing                  runs, executors, cluster, checkpoint
-    inference                  least_squares, variances, consistency, coverage, identifiability, hypotheses, effects;
-                               kernels: factor, sigma_point, kalman
-    results                    result, basis, budget, files, remarks, repeat, compare, formula, table
+    rigs                       chain, patterns, tables, plans, outputs
+    computing                  runs, executors, cluster
+    inference                  least_squares, variances, consistency, identifiability, hypotheses, effects; kernels:
+                               sigma_point, kalman
+    results                    result, basis, budget, files, remarks, repeat, compare, shown
     noise                      deviation, coefficients, running, outcome; dwell_means for the means of a calibration
     sensitivities              exact, sampled, local, dense, averages
-    designs                    candidates, criteria, exchange, search, comparison
+    designs                    criteria, exchange, search, tolerances, foresight
 
     examples                   recordings that ship
 
@@ -87,14 +87,14 @@ Map, lower floors first; each imports only from those above its own line
     validate                   cases with published or closed-form numbers, run by `inercal validate`
     python                     the verbs of Python, and the results that they give back
 
-    laboratory                 results kept in a store: tables, keep, catalog, check; history, certificates
-    fleet                      many units of one make: batch, capability, outliers
+    laboratory                 results kept in a store: database, keep, catalog, check; history, certificates
+    fleet                      many units of one make: manifest, unit, batch, fleet
 
     bench: a measurement while it runs, and the commands in a browser
     live                       an instrument by wire: sources, frames, sinks, a measurement that runs
     workbench                  sessions, jobs, a page each, REST
 
-    cli                        one module per verb
+    cli                        a module for each command or family of them
 """
 
 from typing import TYPE_CHECKING
@@ -103,12 +103,12 @@ if TYPE_CHECKING:
     from inercal.faces.python.calibrations import apply as apply
     from inercal.faces.python.calibrations import compare as compare
     from inercal.faces.python.calibrations import load as load
-    from inercal.faces.python.noise import allan as allan
     from inercal.faces.python.recordings import read as read
     from inercal.faces.python.recordings import record as record
     from inercal.faces.python.result import Result as Result
     from inercal.faces.python.study import Study as Study
     from inercal.faces.python.study import study as study
+    from inercal.faces.python.verbs import allan as allan
     from inercal.faces.python.verbs import calibrate as calibrate
     from inercal.faces.python.verbs import design as design
     from inercal.faces.python.verbs import runs as runs
@@ -130,11 +130,18 @@ _WHERE = {
     name: f"inercal.{module}"
     for module, names in {
         "faces.python.calibrations": ("apply", "compare", "load"),
-        "faces.python.noise": ("allan",),
         "faces.python.recordings": ("read", "record"),
         "faces.python.result": ("Result",),
         "faces.python.study": ("Study", "study"),
-        "faces.python.verbs": ("calibrate", "design", "runs", "sensitivity", "simulate", "temperature"),
+        "faces.python.verbs": (
+            "allan",
+            "calibrate",
+            "design",
+            "runs",
+            "sensitivity",
+            "simulate",
+            "temperature",
+        ),
         "foundation.errors": ("CalibrationError", "InputError"),
         "foundation.records.record": ("Record",),
         "foundation.results.result": ("Estimate",),

@@ -11,14 +11,24 @@ import numpy as np
 import pytest
 from sting_study import BASE, DEG, G, scenario
 
-from inercal.faces.report.over_time import Marks, Signals, gaps, measured, over_time, stretches, thinned
-from inercal.faces.report.spectra import of_angle, peak, spectral_density
 from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.band import Band
 from inercal.systems.aoa.disturbances import Disturbances, Oscillation
 from inercal.systems.aoa.figures import page as page_of
 from inercal.systems.aoa.figures import pictures, sensors
 from inercal.systems.aoa.figures.learned import consistency
+from inercal.systems.aoa.figures.panels import (
+    Marks,
+    Signals,
+    gaps,
+    measured,
+    of_angle,
+    over_time,
+    peak,
+    spectral_density,
+    stretches,
+    thinned,
+)
 from inercal.systems.aoa.settings import Attitude
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from sting_study import BASE, DEG, G, study
 
-from inercal.foundation.computing.checkpoint import load, save
+from inercal.faces.stream.checkpoint import load, save
 from inercal.foundation.errors import RecordError
 from inercal.foundation.units import parse_quantity
 from inercal.systems.aoa.fusion import run as fusion

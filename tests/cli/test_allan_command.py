@@ -7,7 +7,7 @@ import pytest
 
 from inercal.cli import run
 from inercal.examples import FOLDER
-from inercal.faces.validate.noise import ALLANTOOLS, TAU
+from inercal.faces.validate.foundation import ALLANTOOLS, TAU
 from inercal.foundation.instruments.noise import NoiseModel
 from inercal.foundation.results.files import load
 from rows import for_each

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from inercal.foundation.designs import candidates as ca
-from inercal.foundation.designs.candidates import NAMES, basis
+from inercal.foundation.designs import criteria as ca
+from inercal.foundation.designs.criteria import NAMES, basis
 from inercal.foundation.rigs.outputs import gravity_reference, rate_reference
 from inercal.foundation.rigs.tables import turntable
 

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, gravity
 
-from inercal.foundation.designs.candidates import insensitive, within
-from inercal.foundation.designs.criteria import D
+from inercal.foundation.designs.criteria import D, insensitive, within
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.errors import InputError
 from inercal.foundation.rigs.plans import grid

@@ -6,8 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import RATES, TERMS, drift, from_monomials, gravity, with_rates
 
-from inercal.foundation.designs.candidates import NAMES, Candidates, basis, plain
-from inercal.foundation.designs.criteria import D, a_criterion, i_criterion, judge
+from inercal.foundation.designs.criteria import (
+    NAMES,
+    Candidates,
+    D,
+    a_criterion,
+    basis,
+    i_criterion,
+    judge,
+    plain,
+)
 from inercal.foundation.geometry.rotations import elementary
 from inercal.foundation.rigs.plans import grid, named
 

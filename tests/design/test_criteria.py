@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, with_rates
 
-from inercal.foundation.designs.candidates import Candidates
-from inercal.foundation.designs.criteria import D, a_criterion, covariance, i_criterion
+from inercal.foundation.designs.criteria import Candidates, D, a_criterion, covariance, i_criterion
 from inercal.foundation.rigs.plans import grid, named
 
 

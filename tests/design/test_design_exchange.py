@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, with_rates
 
-from inercal.foundation.designs.candidates import Candidates, plain
-from inercal.foundation.designs.criteria import D, a_criterion, covariance, i_criterion
+from inercal.foundation.designs.criteria import Candidates, D, a_criterion, covariance, i_criterion, plain
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.errors import InputError
 from inercal.foundation.rigs.plans import grid

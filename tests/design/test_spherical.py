@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import from_monomials, monomials
 
-from inercal.foundation.designs.candidates import NAMES, basis
+from inercal.foundation.designs.criteria import NAMES, basis
 
 
 def directions(seed, n):

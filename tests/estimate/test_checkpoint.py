@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from inercal.foundation.computing.checkpoint import alone, fingerprint, load, save
+from inercal.faces.stream.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.errors import InputError
 
 

@@ -12,8 +12,9 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.results.budget import BudgetItem
-from inercal.foundation.results.compare import FAMILY, Saved, compare
+from inercal.foundation.results.compare import Saved, compare
 from inercal.foundation.results.files import load, save
+from inercal.foundation.results.limits import LIMITS
 from inercal.foundation.results.result import Estimate, coverage_factor
 
 SITE = {"site": {"gravity_m_s2": 9.81, "latitude_rad": None}}
@@ -202,9 +203,11 @@ def test_where_nothing_moved_the_verdict_is_wrong_in_five_percent_at_most(dof):
         found = compare(*saved)
         wrong += found.status is not Status.OK
         beyond += sum(row["normalised_error"] > 1.0 for row in found.result["coefficients"])
-    assert wrong / runs < FAMILY + 4.0 * np.sqrt(FAMILY * (1.0 - FAMILY) / runs)
+    assert wrong / runs < LIMITS.moved_risk + 4.0 * np.sqrt(
+        LIMITS.moved_risk * (1.0 - LIMITS.moved_risk) / runs
+    )
     # E_n alone would be wrong far more often: 4.55 % of the time for each of eight coefficients
-    assert beyond / runs > 2.0 * FAMILY
+    assert beyond / runs > 2.0 * LIMITS.moved_risk
 
 
 def test_a_coefficient_that_moved_is_named():

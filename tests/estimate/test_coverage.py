@@ -9,7 +9,7 @@ from scipy import stats
 from inercal.foundation.computing.executors import Threads
 from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InputError
-from inercal.foundation.inference.coverage import coverage, nees
+from inercal.foundation.inference.consistency import coverage, nees
 from rows import for_each
 
 
@@ -222,7 +222,7 @@ def test_bad_input_of_nees(P, said):
 
 def test_importing_loads_no_scipy():
     program = (
-        "import sys, inercal.foundation.inference.coverage, inercal.foundation.computing.runs\n"
+        "import sys, inercal.foundation.inference.consistency, inercal.foundation.computing.runs\n"
         "sys.exit('scipy' in sys.modules)"
     )
     path = {"PYTHONPATH": ":".join(p for p in sys.path if p)}

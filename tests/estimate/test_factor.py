@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.foundation.inference.factor import (
+from inercal.foundation.inference.sigma_point import (
     CHOLESKY,
     EIGEN,
     FACTORS,

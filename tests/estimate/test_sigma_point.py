@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inercal.foundation.inference.factor import CHOLESKY, EIGEN, FACTORS, root
 from inercal.foundation.inference.sigma_point import (
+    CHOLESKY,
+    EIGEN,
+    FACTORS,
     covariance,
     cross,
     draw,
@@ -16,6 +18,7 @@ from inercal.foundation.inference.sigma_point import (
     empty_points,
     mean,
     moments,
+    root,
     update,
     weights,
 )

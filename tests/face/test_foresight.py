@@ -7,8 +7,7 @@ import pytest
 
 import inercal as ic
 from inercal.examples import FOLDER
-from inercal.faces.python.beginning import foresight, verticals
-from inercal.faces.python.study import read_study
+from inercal.faces.python.study import foresight, read_study, verticals
 from inercal.foundation.errors import InercalError
 from inercal.foundation.geometry.rotations import to_matrix
 from inercal.foundation.rigs.plans import named

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest
 
-from inercal.laboratory.fleet.capability import Share, spreads
-from inercal.laboratory.fleet.fleet import RISK, TREND_RISK, distances, fleet_of, limit
+from inercal.laboratory.fleet.fleet import Share, distances, fleet_of, limit, spreads
 from inercal.laboratory.fleet.unit import Coefficient, UnitRow
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import specification_of
 
 
@@ -60,7 +60,9 @@ def test_a_sound_fleet_has_no_strange_unit(units, coefficients):
         for _ in range(fleets)
     )
     # the limit itself is a quantile of 200 simulated fleets: as uncertain as this share of 200
-    assert named <= binom.ppf(0.999, fleets, RISK) + 3.1 * np.sqrt(fleets * RISK)
+    assert named <= binom.ppf(0.999, fleets, LIMITS.strange_risk) + 3.1 * np.sqrt(
+        fleets * LIMITS.strange_risk
+    )
 
 
 def test_a_unit_off_along_no_single_coefficient_is_found():
@@ -92,7 +94,7 @@ def test_a_trend_is_found_and_none_where_there_is_none():
     false = sum(
         bool(fleet_of(rows_of(rng.standard_normal((40, 3))), specification()).trends) for _ in range(100)
     )
-    assert false <= binom.ppf(0.999, 100, TREND_RISK)
+    assert false <= binom.ppf(0.999, 100, LIMITS.trend_risk)
 
 
 def test_dates_are_the_time_of_the_trend():

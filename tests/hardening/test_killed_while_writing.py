@@ -411,7 +411,7 @@ def test_a_stream_killed_while_it_saves_goes_on_with_the_same_digits(
     saves = []
 
     def at_the_third() -> None:
-        import inercal.foundation.computing.checkpoint as checkpoint
+        import inercal.faces.stream.checkpoint as checkpoint
 
         write = checkpoint.write_bytes
         signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # here: a live source saves in another thread

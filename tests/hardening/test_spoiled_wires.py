@@ -9,8 +9,7 @@ from wires import HEADER, rows
 
 from inercal.bench.live.address import SINKS, SOURCES, sink_of, source_of
 from inercal.bench.live.feed import LONGEST, Feed
-from inercal.bench.live.intake import Arrival
-from inercal.bench.live.sources import Piece
+from inercal.bench.live.sources import Arrival, Piece
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.monitor import Monitor
 from inercal.faces.stream.run import run

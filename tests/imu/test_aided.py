@@ -17,10 +17,10 @@ from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site
-from inercal.foundation.inference.coverage import coverage
+from inercal.foundation.inference.consistency import coverage
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_quantity, parse_unit
 from inercal.systems.imu.aided.calibration import calibrate_aided

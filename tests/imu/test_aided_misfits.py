@@ -16,7 +16,7 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.records.record import Record
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.imu.aided.calibration import calibrate_aided
 from inercal.systems.imu.aided.simulate import rests_of, simulate

@@ -16,7 +16,7 @@ from inercal.faces.convert.correct import imu_model
 from inercal.foundation.computing.runs import run
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
-from inercal.foundation.inference.coverage import coverage
+from inercal.foundation.inference.consistency import coverage
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris

@@ -12,7 +12,7 @@ from campaigns.imu import one_calibration
 from scipy.stats import binom
 
 from inercal.foundation.computing.runs import run
-from inercal.foundation.inference.coverage import coverage
+from inercal.foundation.inference.consistency import coverage
 
 SEED = 20261121
 RUNS = 250

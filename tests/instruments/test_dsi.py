@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from inercal.foundation.errors import QuantityError
-from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent, stated
-from inercal.foundation.instruments.reference_types import reference_type, reference_types
+from inercal.foundation.instruments.dsi import (
+    as_written,
+    dsi,
+    from_dsi,
+    is_coherent,
+    reference_type,
+    reference_types,
+    stated,
+)
 from inercal.foundation.instruments.terms import MODEL_TERMS, NOISE_TERMS, NUMBERED_TERMS, TERMS
 from inercal.foundation.units import parse_unit
 from rows import for_each

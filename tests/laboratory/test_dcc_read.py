@@ -16,9 +16,8 @@ from made import result as made
 import inercal as ic
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import save, to_json
-from inercal.laboratory.certificate.elements import NAMESPACES
+from inercal.laboratory.certificate.elements import NAMESPACES, parsed
 from inercal.laboratory.certificate.page import page
-from inercal.laboratory.certificate.parsing import parsed
 from inercal.laboratory.certificate.reading import estimate_of_certificate, read_certificate
 from inercal.laboratory.certificate.written import certificate
 

@@ -13,9 +13,9 @@ from inercal.examples import FOLDER
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import save
 from inercal.laboratory.carry import export_store, import_store
-from inercal.laboratory.catalog import show
+from inercal.laboratory.catalog import show, supersede
 from inercal.laboratory.check import check
-from inercal.laboratory.issue import issuing, supersede
+from inercal.laboratory.issue import issuing
 from inercal.laboratory.keep import keep
 from inercal.laboratory.store import make_store, open_store
 

@@ -18,17 +18,16 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.results.files import save
 from inercal.laboratory import keep as keeping
 from inercal.laboratory.carry import export_store, import_store
-from inercal.laboratory.catalog import instruments, results, show, values_of
+from inercal.laboratory.catalog import instruments, results, show, supersede, values_of
 from inercal.laboratory.certificate.reading import certificate_of
 from inercal.laboratory.certificate.written import certificate
 from inercal.laboratory.check import check
-from inercal.laboratory.database import writing
-from inercal.laboratory.issue import issuing, supersede
+from inercal.laboratory.database import Event, Tables, writing
+from inercal.laboratory.issue import issuing
 from inercal.laboratory.keep import Item, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.scrub import scrub
 from inercal.laboratory.store import digest_of, happened, make_store, open_store
-from inercal.laboratory.tables import Event, Tables
 from rows import for_each
 
 SECRET = "Hunter2SeCrEt"
@@ -40,7 +39,7 @@ def secrets_of_old(monkeypatch):
     for module in (
         "foundation.results.files",
         "laboratory.keep",
-        "laboratory.issue",
+        "laboratory.catalog",
         "laboratory.certificate.written",
     ):
         monkeypatch.setattr(f"inercal.{module}.without_secrets", lambda given: given)

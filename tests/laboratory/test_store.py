@@ -22,10 +22,9 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.inputs import Source
 from inercal.foundation.results.files import to_json
 from inercal.laboratory.carry import export_store, import_store
-from inercal.laboratory.catalog import find, instruments, results, show, values_of
+from inercal.laboratory.catalog import find, instruments, results, show, supersede, values_of
 from inercal.laboratory.check import check
 from inercal.laboratory.database import VERSION, migrate
-from inercal.laboratory.issue import supersede
 from inercal.laboratory.keep import Item, item_of, keep
 from inercal.laboratory.objects import Objects
 from inercal.laboratory.store import make_store, open_store, upgrade_store
@@ -264,7 +263,7 @@ def test_the_migrations_make_the_tables_that_the_program_reads(store):
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
 
-    from inercal.laboratory.tables import Tables
+    from inercal.laboratory.database import Tables
 
     with store.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Tables.metadata) == []

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.laboratory.chart import FIRST, chart
+from inercal.laboratory.history import chart
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.wander import CalibrationSeries, wandering
 
 STATED = 0.9545
@@ -64,8 +65,8 @@ def test_charts_alarm_at_most_at_their_rate_where_nothing_changes(scatter):
     for _ in range(300):
         y = rng.normal(size=20) * np.hypot(1.0, scatter)
         found = chart(CalibrationSeries(np.arange(20.0), y, np.ones(20), np.zeros(20)))
-        single.append(found.alarms[FIRST:])
-        drift.append(found.drift_alarms[FIRST:])
+        single.append(found.alarms[LIMITS.first_calibrations :])
+        drift.append(found.drift_alarms[LIMITS.first_calibrations :])
     count = 300 * 18
     # points of one EWMA are alike: about nine of them in a row (L = 0.2) are one
     for alarms, independent in ((single, count), (drift, count / 9)):

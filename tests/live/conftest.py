@@ -3,7 +3,7 @@
 import pytest
 from wires import STUDY, Mosquitto
 
-from inercal.bench.live import intake, pieces
+from inercal.bench.live import pieces, sources
 
 
 @pytest.fixture
@@ -31,5 +31,5 @@ def broker(shared_broker, monkeypatch):
 @pytest.fixture
 def quick(monkeypatch):
     """Short pauses, and pieces of a fifth of a second."""
-    monkeypatch.setattr(intake, "PAUSES", (0.05, 0.2))
+    monkeypatch.setattr(sources, "PAUSES", (0.05, 0.2))
     monkeypatch.setattr(pieces, "SPAN", 0.2)

@@ -3,10 +3,10 @@
 import pytest
 from wires import HEADER, Cable, Server, by_stream, free_port, rows, until, waiting, wire
 
-from inercal.bench.live import intake as intakes
+from inercal.bench.live import sources
 from inercal.bench.live.address import source_of
-from inercal.bench.live.intake import Intake
 from inercal.bench.live.measurement import measure
+from inercal.bench.live.sources import Intake
 
 KINDS = ("serial", "udp", "tcp", "mqtts")
 
@@ -209,7 +209,7 @@ def test_versions_of_mqtt(study, tmp_path, broker):
 
 
 def test_silence_is_said(study, tmp_path, monkeypatch, request):
-    monkeypatch.setattr(intakes, "SILENCE", 0.1)
+    monkeypatch.setattr(sources, "SILENCE", 0.1)
     near = Cable(tmp_path)
     request.addfinalizer(near.close)
     running = waiting(f"serial:{near.name}", study)
@@ -219,7 +219,7 @@ def test_silence_is_said(study, tmp_path, monkeypatch, request):
 
 
 def test_where_there_is_no_room_datagrams_are_dropped_and_counted(monkeypatch, tmp_path, request):
-    monkeypatch.setattr(intakes, "ROOM", 500)
+    monkeypatch.setattr(sources, "ROOM", 500)
     said = []
     near, address = wire("udp", tmp_path)
     request.addfinalizer(near.close)
@@ -240,7 +240,7 @@ def test_where_there_is_no_room_datagrams_are_dropped_and_counted(monkeypatch, t
 
 
 def test_a_connection_waits_where_there_is_no_room(monkeypatch, tmp_path, request):
-    monkeypatch.setattr(intakes, "ROOM", 70_000)
+    monkeypatch.setattr(sources, "ROOM", 70_000)
     near, address = wire("tcp", tmp_path)
     request.addfinalizer(near.close)
     intake = Intake(source_of(address), pytest.fail)

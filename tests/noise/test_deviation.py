@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.instruments.noise import SYMBOLS, NoiseModel
-from inercal.foundation.noise.deviation import PRESENT, allan_deviation, regular
+from inercal.foundation.noise.deviation import allan_deviation, regular
 from inercal.foundation.noise.dwell_means import overlapping_variance, running_sums
+from inercal.foundation.noise.limits import LIMITS
 from rows import for_each
 
 
@@ -17,7 +18,7 @@ def plain(x, m):
     before, after = (
         np.lib.stride_tricks.sliding_window_view(x, m)[k : k + len(x) - 2 * m + 1] for k in (0, m)
     )
-    enough = [np.isfinite(part).sum(axis=1) >= np.ceil(PRESENT * m) for part in (before, after)]
+    enough = [np.isfinite(part).sum(axis=1) >= np.ceil(LIMITS.present_share * m) for part in (before, after)]
     there = enough[0] & enough[1]
     d = np.nanmean(after[there], axis=1) - np.nanmean(before[there], axis=1)
     return (np.mean(d**2) / 2 if len(d) else np.nan), len(d)
@@ -51,7 +52,7 @@ def test_gain_of_white_noise_and_of_quantisation_is_that_of_the_weights(n, m, se
     white, steps = [], []
     for i in range(n - 2 * m + 1):
         halves = there[i : i + m], there[i + m : i + 2 * m]
-        if min(half.sum() for half in halves) >= np.ceil(PRESENT * m):
+        if min(half.sum() for half in halves) >= np.ceil(LIMITS.present_share * m):
             w = m * np.concatenate(
                 [sign * half / half.sum() for sign, half in zip((-1, 1), halves, strict=True)]
             )

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from inercal.faces.validate.noise import thousand
+from inercal.faces.validate.foundation import thousand
 from inercal.foundation.instruments.noise import BIAS_FLOOR
 from inercal.foundation.noise.dwell_means import (
     AllanFit,

@@ -9,8 +9,9 @@ from inercal.foundation.instruments.noise import NoiseModel, allan_terms
 from inercal.foundation.noise import covariance
 from inercal.foundation.noise.covariance import ALPHA, degrees_of_freedom, lag_one, pair_sums, sums
 from inercal.foundation.noise.curve import AllanCurve
-from inercal.foundation.noise.deviation import PRESENT, allan_deviation
+from inercal.foundation.noise.deviation import allan_deviation
 from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
+from inercal.foundation.noise.limits import LIMITS
 
 
 def generalised(kind, n):
@@ -44,7 +45,7 @@ def weights(there, m):
         inside = (at >= begin) & (at < begin + m) & there
         count = inside.sum(axis=1, keepdims=True)
         rows = rows + sign * inside * m / np.maximum(count, 1)
-        enough = enough & (count[:, 0] >= np.ceil(PRESENT * m))
+        enough = enough & (count[:, 0] >= np.ceil(LIMITS.present_share * m))
     return rows[enough]
 
 

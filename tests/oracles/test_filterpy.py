@@ -5,7 +5,7 @@ import plain_filterpy
 import pytest
 from paper_study import study
 
-from inercal.foundation.inference.factor import EIGEN, root
+from inercal.foundation.inference.sigma_point import EIGEN, root
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import quaternion
 from inercal.systems.selfcal.filters.problem import problem

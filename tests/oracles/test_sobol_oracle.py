@@ -7,8 +7,8 @@ from SALib.analyze import sobol as salib
 from SALib.sample import sobol as salib_points
 from scipy.stats import sobol_indices
 
-from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import exact
 from inercal.foundation.sensitivities.sampled import draw, estimate, evaluate

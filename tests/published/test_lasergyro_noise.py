@@ -10,7 +10,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-from inercal.faces.validate.noise import ALLANTOOLS, TAU
+from inercal.faces.validate.foundation import ALLANTOOLS, TAU
 from inercal.foundation.noise.coefficients import noise_coefficients
 from inercal.foundation.noise.deviation import allan_deviation
 

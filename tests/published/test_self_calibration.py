@@ -10,7 +10,7 @@ import pytest
 from paper_study import ARCSEC, DEG, NOISE, PPM, PRIOR, TRUTH, gating_costs, study
 
 from inercal.foundation.geometry.rotations import boxminus, boxplus
-from inercal.foundation.inference.factor import NEGATIVE
+from inercal.foundation.inference.sigma_point import NEGATIVE
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.before.path_design import at_rest, with_stops
 from inercal.systems.selfcal.before.simulate import experiment, simulate

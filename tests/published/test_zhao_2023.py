@@ -16,8 +16,8 @@ from numpy.testing import assert_allclose
 
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
-from inercal.foundation.rigs.distribution import uniform
 from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import averages, exact, local, sampled

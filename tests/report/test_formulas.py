@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from inercal.faces.report.formulas import clauses
+from inercal.faces.report.html import clauses
 from inercal.foundation.results.basis import Formula
 from rows import for_each
 

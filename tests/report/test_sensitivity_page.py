@@ -11,7 +11,7 @@ from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.patterns import normal, uniform
 from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.figures.sensitivity import _even_grid, _map, interactions, maps

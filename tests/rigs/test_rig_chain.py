@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from inercal.foundation.geometry.rotations import elementary, exp, to_matrix
 from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
-from inercal.foundation.rigs.distribution import density, normal, uniform
+from inercal.foundation.rigs.patterns import density, normal, uniform
 from inercal.foundation.rigs.tables import turntable
 
 ARC_MINUTE = np.radians(1.0 / 60.0)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
-from inercal.foundation.rigs.distribution import density, normal, triangular, two_point, uniform
+from inercal.foundation.rigs.patterns import density, normal, triangular, two_point, uniform
 from rows import for_each
 
 H = np.radians(2.0 / 60.0)

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from inercal.foundation.geometry.rotations import elementary
 from inercal.foundation.rigs.chain import Scope
-from inercal.foundation.rigs.distribution import normal, uniform
+from inercal.foundation.rigs.patterns import normal, uniform
 from inercal.foundation.rigs.tables import TABLES, slots, turntable
 
 LAW = uniform(np.radians(2.0 / 60.0))

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 import inercal as ic
 from inercal.cli.options import ResultOutput
-from inercal.cli.selfcal import _live
+from inercal.faces.stream.estimators import selfcal as prepared
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import run
 from inercal.foundation.errors import RecordError, StudyError
@@ -188,7 +188,8 @@ def test_a_stream_leaves_out_what_a_fixed_joint_hides(tmp_path, capsys):
     file = tmp_path / "record.csv"
     driven(rng, Drive(TWO), truth, NOMINAL, faults, Place(begin=tuple(AT))).write(file, WITHOUT["two axes"])
     asked = of_study(tmp_path, "two axes")
-    make = _live(ic.study(asked).settings, 0.0, ResultOutput(), until_goals=False)
+    output = ResultOutput()
+    make = prepared(ic.study(asked).settings, 0.0, output.say, output.say_finding)
     assert "at_prior: nonorth_xy, nonorth_yz: th_y stands still" in capsys.readouterr().err
     lines = Lines(io.BytesIO(file.read_bytes()), "record", None, lambda _: None)
     out = list[str]()

@@ -8,7 +8,7 @@ import pytest
 from paper_study import study
 
 from inercal.foundation.geometry.rotations import exp, multiply
-from inercal.foundation.inference.factor import CHOLESKY, FACTORS, NEGATIVE, root
+from inercal.foundation.inference.sigma_point import CHOLESKY, FACTORS, NEGATIVE, root
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import error_state, quaternion
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem

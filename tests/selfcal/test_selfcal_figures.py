@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from paper_study import ARCSEC, MICRO_G, PER_HOUR, PRIOR, TRUTH, study
 
 import inercal.systems.selfcal.figures as drawn_by
-from inercal.faces.report import innovations as filtering
+from inercal.faces.report import courses as filtering
 from inercal.faces.report.cells import Cell
 from inercal.faces.report.coefficients import dots
 from inercal.faces.report.courses import turning

@@ -8,7 +8,7 @@ import mpmath as mp
 import numpy as np
 
 from inercal.foundation.rigs.chain import Error, Fixed, Joint
-from inercal.foundation.rigs.distribution import density, normal, triangular, two_point, uniform
+from inercal.foundation.rigs.patterns import density, normal, triangular, two_point, uniform
 
 DIGITS = 60
 

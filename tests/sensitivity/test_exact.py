@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from inercal.foundation.geometry.rotations import elementary
 from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope, about
-from inercal.foundation.rigs.distribution import normal, two_point, uniform
 from inercal.foundation.rigs.outputs import Output, table_outputs
+from inercal.foundation.rigs.patterns import normal, two_point, uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import averages

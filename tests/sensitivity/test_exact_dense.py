@@ -6,8 +6,8 @@ from high_precision import KINDS
 
 from inercal.foundation.geometry.rotations import elementary
 from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint, Scope
-from inercal.foundation.rigs.distribution import density, normal, two_point, uniform
 from inercal.foundation.rigs.outputs import Output, gravity_reference, rate_reference
+from inercal.foundation.rigs.patterns import density, normal, two_point, uniform
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import dense
 

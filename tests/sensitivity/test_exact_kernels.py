@@ -10,8 +10,8 @@ import pytest
 
 import inercal
 from inercal.foundation.geometry.rotations import elementary
-from inercal.foundation.rigs.distribution import density, normal, uniform
 from inercal.foundation.rigs.outputs import Output, table_outputs
+from inercal.foundation.rigs.patterns import density, normal, uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import dense
@@ -76,7 +76,7 @@ def test_order_of_positions_and_threads_do_not_change_a_digit():
 
 PROGRAM = """
 import numpy as np
-from inercal.foundation.rigs.distribution import density
+from inercal.foundation.rigs.patterns import density
 from inercal.foundation.rigs.outputs import table_outputs
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import dense, kernels

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
-from inercal.foundation.rigs.distribution import density, uniform
 from inercal.foundation.rigs.outputs import table_outputs
+from inercal.foundation.rigs.patterns import density, uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import exact, local

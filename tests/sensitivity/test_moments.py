@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from high_precision import KINDS, relative, wave
 
-from inercal.foundation.rigs.distribution import Distribution, uniform
-from inercal.foundation.sensitivities.moments import moments
+from inercal.foundation.rigs.patterns import Distribution, uniform
+from inercal.foundation.sensitivities.exact import moments
 
 ARCSEC = np.pi / 180.0 / 3600.0
 SIZES = [ARCSEC, 120.0 * ARCSEC, 0.01, np.radians(50.0)]

@@ -10,9 +10,9 @@ from sting_study import BASE, DEG, G, study
 from streams_that_break import lines_out
 
 from inercal.faces.stream.aoa import Aoa
+from inercal.faces.stream.checkpoint import fingerprint
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import Saving
-from inercal.foundation.computing.checkpoint import fingerprint
 from inercal.foundation.errors import InputError, RecordError, StudyError
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record

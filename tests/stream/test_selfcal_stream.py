@@ -322,7 +322,7 @@ def test_settings_that_decide_the_digits_are_in_the_fingerprint(tmp_path):
         replace(base, filter=Filter(gating=Gating("two"))),
         replace(base, base=replace(base.base, heading=0.1)),
     ]
-    from inercal.foundation.computing.checkpoint import fingerprint
+    from inercal.faces.stream.checkpoint import fingerprint
 
     marks = {fingerprint(Selfcal(lines, problem(each)).settings) for each in (base, *others)}
     assert len(marks) == 1 + len(others)

@@ -4,7 +4,7 @@ import numpy as np
 
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
 from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 from new_studies import filled
 
 import inercal as ic
-from inercal.bench.workbench.plans import lines_of, named, with_lines
+from inercal.bench.workbench.pages.form import lines_of, named, with_lines
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.faces.python.study import kind_of, read_study

@@ -12,7 +12,7 @@ from inercal.faces.convert.models import worth_knowing
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.records.record import record_of
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.rate.several_axes import axis_about

@@ -8,7 +8,7 @@ from turntable_studies import ARCMIN, DEG_H, study, table
 
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.by_angle import channel_model
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, listed
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.model import table_model

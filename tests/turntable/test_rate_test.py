@@ -15,8 +15,8 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.rigs.chain import Scope
-from inercal.foundation.rigs.distribution import normal, uniform
 from inercal.foundation.rigs.outputs import rate_reference
+from inercal.foundation.rigs.patterns import normal, uniform
 from inercal.foundation.rigs.plans import named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

@@ -22,7 +22,7 @@ from turntable_studies import (
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.instruments.by_angle import CHANNELS
 from inercal.foundation.rigs.chain import Scope
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.systems.turntable.model import table_model
 from inercal.systems.turntable.regression import fit, identify_channels

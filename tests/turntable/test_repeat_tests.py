@@ -12,7 +12,7 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.repeat import combine_runs
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.positions.calibration import calibrate_positions

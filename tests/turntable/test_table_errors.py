@@ -16,8 +16,7 @@ from turntable_studies import ARCMIN, DEG_H, TUMBLE, WHEEL, study, table
 
 from inercal.faces.studies.turntable import turntable_study
 from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
-from inercal.foundation.rigs.distribution import normal
-from inercal.foundation.rigs.patterns import Harmonic, Known, Tabulated
+from inercal.foundation.rigs.patterns import Harmonic, Known, Tabulated, normal
 from inercal.foundation.rigs.plans import listed
 from inercal.systems.turntable.model import table_model
 from inercal.systems.turntable.positions.simulate import simulate, truth

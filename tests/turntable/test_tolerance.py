@@ -19,7 +19,7 @@ from turntable_studies import (
 
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.rigs.chain import Scope
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.plans import grid
 from inercal.systems.turntable.model import table_model
 from inercal.systems.turntable.positions.simulate import simulate

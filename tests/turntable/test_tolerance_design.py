@@ -12,7 +12,7 @@ import inercal as ic
 from inercal.cli import run
 from inercal.foundation.designs.tolerances import LOOSEST, Price
 from inercal.foundation.errors import StudyError
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.figures.tolerances import page

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from turntable_studies import usual_terms
 
-from inercal.faces.validate.gyrowheel import (
+from inercal.faces.validate.table import (
     one_turntable_calibration,
     one_turntable_calibration_of_unknown_noise,
 )
 from inercal.foundation.computing.runs import run
-from inercal.foundation.inference.coverage import coverage, nees
+from inercal.foundation.inference.consistency import coverage, nees
 
 SEED = 20261121
 RUNS = 250

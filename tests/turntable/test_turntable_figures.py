@@ -15,7 +15,7 @@ from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import rounded
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

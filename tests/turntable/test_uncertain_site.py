@@ -20,7 +20,7 @@ from turntable_studies import (
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.records.record import record_of
-from inercal.foundation.rigs.distribution import normal
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from inercal.faces.convert import other_tools
-from inercal.faces.validate import aoa, foundation, imu, noise, selfcal, strapdown, turntable
+from inercal.faces.validate import aoa, foundation, imu, selfcal, strapdown, turntable
 from inercal.faces.validate.case import SOURCES, Case, Numbers, find, judge
 from inercal.faces.validate.run import SYSTEMS, cases_of, validate
 from inercal.foundation.computing.executors import Serial
@@ -171,7 +171,7 @@ def test_least_squares_by_the_normal_equations(monkeypatch):
 def test_a_sum_of_squares_that_is_too_large(monkeypatch):
     right = deviation.mean_square
     monkeypatch.setattr(deviation, "mean_square", lambda sums, m: 1.0001 * right(sums, m))
-    failed = red(noise.CASES)
+    failed = red(foundation.NOISE_CASES)
     assert failed >= {"nist-nine-points", "nist-1000-points", "stable32-octaves", "ring-laser-allan"}
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import inercal as ic
-from inercal.bench.workbench.charts import BLOCK, PIECES, courses, figure, line
+from inercal.bench.workbench.charts import BLOCK, PIECES, course_figure, courses, line
 
 RNG = np.random.default_rng(5)
 LONG = 2 * PIECES * BLOCK + 100_000
@@ -42,7 +42,7 @@ def test_zooming_ends_at_the_samples_themselves():
 def test_missing_samples_leave_no_number_and_no_warning():
     values = RNG.normal(size=10_000)
     values[2000:4000] = np.nan
-    made = figure(courses(ic.record(acc_x=values, acc_y=values, rate=100.0)))
+    made = course_figure(courses(ic.record(acc_x=values, acc_y=values, rate=100.0)))
     assert None in made["data"][0]["y"]
     assert {each["yaxis"] for each in made["data"]} == {"y"}
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from inercal.bench.workbench.form import as_toml, problem, tables
+from inercal.bench.workbench.pages.form import as_toml, problem, tables
 from inercal.faces.studies.template import template
 from inercal.faces.studies.text import changed
 from inercal.systems.listed import SYSTEMS

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inercal.bench.workbench.guard import LARGEST_BODY, POLICY, AccessKey, Guard
+from inercal.bench.workbench.serve import LARGEST_BODY, POLICY, AccessKey, Guard
 
 HERE, SECRET = "127.0.0.1:8000", "s3cret-of-this-run"
 

@@ -15,8 +15,7 @@ from browsing import browser, needs_browser, opened, serious
 from serving import served
 
 from inercal.bench.workbench.bench import open_bench
-from inercal.bench.workbench.live_pictures import POINTS, drawable, figure, words_of
-from inercal.bench.workbench.live_status import status
+from inercal.bench.workbench.live_status import POINTS, drawable, row_figure, status, words_of
 from inercal.bench.workbench.measurements import MOST, Wish, interval_of, next_name
 from inercal.bench.workbench.sessions import put
 from inercal.examples import FOLDER
@@ -201,10 +200,10 @@ def test_the_picture_has_a_band_of_two_standard_uncertainties():
     columns = ["t [s]", "status", "theta [deg]", "u_theta [deg]"]
     assert list(drawable(columns)) == ["theta [deg]", "status"]
     rows = [[0.01 * k, "ok", 1.0 + k, 0.5] for k in range(3 * POINTS)] + [[99.0, "lost", None, None]]
-    low, high, line = figure(columns, rows, "theta [deg]")["data"]
+    low, high, line = row_figure(columns, rows, "theta [deg]")["data"]
     assert len(line["x"]) <= POINTS
     assert (low["y"][0], high["y"][0], line["y"][0]) == (0.0, 2.0, 1.0)
-    assert figure(columns, [], "")["data"] == []
+    assert row_figure(columns, [], "")["data"] == []
     assert words_of(1.23456, 0.01) == "1.235 ± 0.020"
     assert words_of(None, None) == "–"
     assert words_of("lost", None) == "lost"

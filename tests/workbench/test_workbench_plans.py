@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from inercal.bench.workbench.plans import lines_of, named, with_found, with_lines
+from inercal.bench.workbench.pages.form import lines_of, named, with_found, with_lines
 from inercal.examples import FOLDER
-from inercal.faces.python.beginning import verticals
-from inercal.faces.python.study import read_study
+from inercal.faces.python.study import read_study, verticals
 from inercal.faces.studies.text import with_keys
 from inercal.foundation.errors import InputError
 from inercal.systems.listed import SYSTEMS

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from inercal.bench.workbench.advice import advice_of
-from inercal.bench.workbench.charts import Notes, courses, figure, marks_of
-from inercal.bench.workbench.residuals import figure as of_residuals
-from inercal.bench.workbench.residuals import parts_of, spans_of
+from inercal.bench.workbench.charts import Notes, course_figure, courses, marks_of, parts_of, spans_of
+from inercal.bench.workbench.charts import residual_figure as of_residuals
+from inercal.bench.workbench.pages.form import advice_of
 from inercal.examples import FOLDER
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source
@@ -129,7 +128,7 @@ def test_findings_are_marked_where_they_lie_and_rests_are_shaded():
     of = Record(of.columns, findings)
     marks = marks_of(of)
     assert marks == {12.5: "gap", 30.0: "gap", 1.0: "outlier", 5.0: "outlier"}
-    drawn = figure(courses(of), None, Notes(marks, [(0.0, 10.0), (20.0, 40.0)]))["layout"]
+    drawn = course_figure(courses(of), None, Notes(marks, [(0.0, 10.0), (20.0, 40.0)]))["layout"]
     shapes = [(each["x0"], each["x1"]) for each in drawn["shapes"] if each["type"] == "rect"]
     assert shapes == [(0.0, 10.0), (20.0, 40.0), (10.0, 20.0)]
     assert [each["text"] for each in drawn["annotations"]] == [*marks.values()]

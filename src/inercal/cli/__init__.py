@@ -1,4 +1,4 @@
-"""The command line: one module per verb, each loaded only when it is asked for."""
+"""The command line: a module for each command or family of them, loaded only when it is asked for."""
 
 from __future__ import annotations
 

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.cli.options import MapFile, Overrides, ResultOutput, Span, StudyFile, read_repeats, working
+from inercal.cli.options import (
+    MapFile,
+    Overrides,
+    ResultOutput,
+    Span,
+    StudyFile,
+    map_in,
+    read_repeats,
+    study_in,
+    working,
+)
 from inercal.cli.outcome import WHOLE, give
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.foundation.errors import InputError
 from inercal.systems.aoa.estimators import Centrifugal, States, Static, Tangential
 
 if TYPE_CHECKING:
-    from inercal.cli.streaming import Estimators
-    from inercal.faces.stream.lines import Lines
-    from inercal.faces.stream.run import Recursive
     from inercal.foundation.records.record import Record
-    from inercal.systems.aoa.settings import AoaSettings
 
 
 @Parameter(name="*")
@@ -119,10 +124,10 @@ def aoa(
     ] = False,
     every: Every = None,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
+    span: Span = Span(),
     overrides: Overrides = None,
-    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    streaming: StreamOptions = StreamOptions(),
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Measure the angle of attack of a wind-tunnel model."""
     keys = [*(overrides or ()), *how.keys]
@@ -132,23 +137,19 @@ def aoa(
     if runs is not None:
         return _runs(runs, files, study, keys, how, stream, map_file, span, output)
     if stream:
-        made: list[Any] = []
-        prepare = partial(_live, made)
-        stream_study("aoa", prepare, files, study, keys, every, map_file, span, streaming, output)
-        failure = made[-1].failure if made else ""
-        if failure:
+        made: Any = stream_study("aoa", files, study, keys, every, map_file, span, streaming, output)
+        if failure := made.failure:
             output.say(failure)
         return 1 if failure else 0
     paths = recorded("aoa", files, streaming, every)
 
-    from inercal.faces.python.study import one_run, read_study
+    from inercal.faces.python.study import one_run
     from inercal.foundation._jit import compiling
     from inercal.foundation.records.write import SUFFIXES
     from inercal.systems.aoa import verbs as system
 
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
-    the_study = read_study("aoa", study, keys)
-    output.spare(the_study.files)
+    the_study, _ = study_in("aoa", study, keys, output)
     clock = time.perf_counter()
     record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
     read_s = time.perf_counter() - clock
@@ -172,9 +173,7 @@ def _runs(
     output: ResultOutput,
 ) -> int:
     """Measure the runs of a table."""
-    from inercal.faces.python.study import read_study
     from inercal.foundation._jit import compiling
-    from inercal.foundation.records.maps import read_map
     from inercal.foundation.records.read import read
     from inercal.foundation.records.write import SUFFIXES
     from inercal.systems.aoa import verbs as system
@@ -185,10 +184,9 @@ def _runs(
                 "--runs", f"found with {option}, expected the table alone, which names the files"
             )
     output.check((*WHOLE, *SUFFIXES), (table, map_file, study))
-    the_study = read_study("aoa", study, keys)
-    output.spare(the_study.files)
+    the_study, _ = study_in("aoa", study, keys, output)
     span.check()
-    record_map = None if map_file is None else read_map(map_file)
+    record_map = map_in(map_file)
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
         system.prepare(the_study, how.compare)
@@ -200,21 +198,3 @@ def _runs(
     with working(output) as progress:
         result = system.runs(table, the_study, record, how.compare, progress)
     return give(result, output, 0.0, "runs")
-
-
-def _live(
-    made: list[Any],
-    settings: AoaSettings,
-    interval: float,
-    output: ResultOutput,
-) -> Estimators:
-    """Prepare a measurement row by row; ``made`` receives it."""
-    from inercal.faces.stream.estimators import aoa as prepared
-
-    make = prepared(settings, interval, output.say, output.say_finding)
-
-    def estimator(lines: Lines) -> Recursive[Any]:
-        made.append(make(lines))
-        return made[-1]  # type: ignore[no-any-return]
-
-    return estimator

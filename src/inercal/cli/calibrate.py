@@ -1,55 +1,68 @@
-"""``inercal calibrate`` and ``inercal temperature``."""
+"""Calibrating by a recording: ``inercal calibrate``, ``selfcal``, ``temperature``, and ``batch`` of many units."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from inercal.cli import EXIT_BAD_VERDICT, command_line
 from inercal.cli.options import (
+    ClusterOption,
     MapFile,
+    OutputOptions,
     Overrides,
     ResultOutput,
     RunFiles,
     Span,
+    StoreOption,
     StudyFile,
+    WorkersOption,
+    count_of,
     read_record,
     read_repeats,
+    reading,
+    study_in,
     working,
 )
-from inercal.cli.outcome import WHOLE, give
-from inercal.cli.streaming import StreamOptions, recorded, stream_study
+from inercal.cli.outcome import WHOLE, emit, give
+from inercal.cli.streaming import Every, StreamedFiles, StreamOptions, recorded, stream_study
 from inercal.foundation.errors import InputError
+from inercal.systems.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
-    from inercal.cli.streaming import Estimators
-    from inercal.systems.imu.temperature.model import TemperatureModel
-    from inercal.systems.strapdown.settings import StrapdownSettings
+    from inercal.foundation.records.record import Record
 
 
-def calibrate_imu(
-    files: RunFiles,
-    /,
-    *,
-    study: StudyFile,
-    map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
-    overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
-) -> int:
-    """Calibrate an IMU held by hand, set on its sides and turned, or turned by a table."""
-    return _calibrated("imu", files, study, map_file, span, overrides, output)
+def _calibrating(kind: str) -> Callable[..., int]:
+    """The command that calibrates by a study of a kind."""
+
+    def command(
+        files: RunFiles,
+        /,
+        *,
+        study: StudyFile,
+        map_file: MapFile = None,
+        span: Span = Span(),
+        overrides: Overrides = None,
+        output: ResultOutput = ResultOutput(),
+    ) -> int:
+        return _calibrated(kind, files, study, map_file, span, overrides, output)
+
+    return command
+
+
+calibrate_imu = _calibrating("imu")
+calibrate_turntable = _calibrating("turntable")
 
 
 def calibrate_strapdown(
-    files: Annotated[
-        list[Path] | None,
-        Parameter(
-            help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
-        ),
-    ] = None,
+    files: StreamedFiles = None,
     /,
     *,
     study: StudyFile,
@@ -64,10 +77,10 @@ def calibrate_strapdown(
         ),
     ] = False,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
+    span: Span = Span(),
     overrides: Overrides = None,
-    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    streaming: StreamOptions = StreamOptions(),
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Calibrate a strapdown unit from rests and coarse turns."""
     keys = [*(overrides or ()), *([f"strapdown.filter={estimator}"] if estimator is not None else [])]
@@ -76,31 +89,10 @@ def calibrate_strapdown(
             raise InputError(
                 "--filter", "found batch with a stream, expected error-state, which goes rest by rest"
             )
-        stream_study("strapdown", _live, files, study, keys, None, map_file, span, streaming, output)
+        stream_study("strapdown", files, study, keys, None, map_file, span, streaming, output)
         return 0
     paths = recorded("calibrate strapdown", files, streaming)
     return _calibrated("strapdown", paths, study, map_file, span, keys, output)
-
-
-def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) -> Estimators:
-    """Prepare a calibration rest by rest."""
-    from inercal.faces.stream.estimators import strapdown as prepared
-
-    return prepared(settings, output.say, output.say_finding)
-
-
-def calibrate_turntable(
-    files: RunFiles,
-    /,
-    *,
-    study: StudyFile,
-    map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
-    overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
-) -> int:
-    """Calibrate an instrument that was taken through positions on a turntable."""
-    return _calibrated("turntable", files, study, map_file, span, overrides, output)
 
 
 def _calibrated(
@@ -113,11 +105,8 @@ def _calibrated(
     output: ResultOutput,
 ) -> int:
     """Read study and records, calibrate, and hand over."""
-    from inercal.faces.python.study import read_study
-
     output.check(WHOLE, (*files, map_file, study))
-    the_study = read_study(kind, study, overrides or ())
-    output.spare(the_study.files)
+    the_study, _ = study_in(kind, study, overrides, output)
     clock = time.perf_counter()
     records = read_repeats(files, map_file, output, span, the_study.system.counted(the_study.settings))
     read_s = time.perf_counter() - clock
@@ -139,7 +128,7 @@ def temperature(
     /,
     *,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
+    span: Span = Span(),
     at: Annotated[
         str, Parameter(help="Temperature T0 about which the polynomial is written; 25 degC if absent.")
     ] = "25 degC",
@@ -149,39 +138,143 @@ def temperature(
             help="Highest power of temperature, 1 to 5; if absent, of a sweep as the data tell, else a cubic."
         ),
     ] = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Fit what a sensor's output or its calibration does with temperature."""
-    from dataclasses import replace
-
+    from inercal.faces.python.verbs import temperature as of_temperature
     from inercal.foundation.units import parse_quantity
-    from inercal.systems.imu.verbs import of_temperature
 
     reference = parse_quantity(at, "temperature", "--at").value
     output.check(WHOLE, (*files, map_file))
     clock = time.perf_counter()
+    given: Record | list[Path] = files
     if all(file.suffix.lower() in WHOLE for file in files):
         if map_file is not None:
             raise InputError("--map", "found one beside calibrations, expected none: they need no column map")
         span.refuse("calibrations")
-        model, read_s = _of_calibrations(files, reference, order), time.perf_counter() - clock
     else:
-        from inercal.systems.imu.temperature.sweep import fit_recording
-
-        record = read_record(files, map_file, output, span)
-        read_s = time.perf_counter() - clock
-        model = fit_recording(record, reference, order)
-    solve_s = time.perf_counter() - clock - read_s
-    result = of_temperature(replace(model, estimate=replace(model.estimate, timing={"solve": solve_s})))
-    return give(result, output, read_s, "temperature model")
+        given = read_record(files, map_file, output, span)
+    read_s = time.perf_counter() - clock
+    return give(of_temperature(given, reference, order), output, read_s, "temperature model")
 
 
-def _of_calibrations(files: list[Path], reference: float, order: int | None) -> TemperatureModel:
-    """The model of saved calibrations, in the order given."""
-    from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.files import load
-    from inercal.systems.imu.temperature.calibrations import fit_calibrations
+def selfcal(
+    files: StreamedFiles = None,
+    /,
+    *,
+    study: StudyFile,
+    kind: Annotated[
+        FilterKind | None,
+        Parameter(
+            name="--filter",
+            help="Estimator, in the place of that of the study. Points of svd-qukf are drawn by the eigenvalues of the "
+            "covariance; by its singular values or its Cholesky factor with --set filter.factor=svd, or cholesky.",
+        ),
+    ] = None,
+    compare: Annotated[bool, Parameter(help="Run all estimators, and set them side by side.")] = False,
+    stream: Annotated[
+        bool, Parameter(help="Lines in, from standard input or one FILE, and coefficients out, live.")
+    ] = False,
+    every: Every = None,
+    until_goals: Annotated[
+        bool, Parameter(help="End a stream where the goals of the study are met and nothing contradicts it.")
+    ] = False,
+    map_file: MapFile = None,
+    span: Span = Span(),
+    overrides: Overrides = None,
+    streaming: StreamOptions = StreamOptions(),
+    output: ResultOutput = ResultOutput(),
+) -> int:
+    """Calibrate a gimbaled platform while it turns."""
+    keys = [*(overrides or ()), *([f"filter.kind={kind}"] if kind is not None else [])]
+    if stream:
+        if compare:
+            raise InputError("--compare", "found with a stream, expected one estimator")
+        from inercal.faces.stream.estimators import selfcal as prepared
 
-    return fit_calibrations(
-        [load(file) for file in files], [source_of(file) for file in files], reference, order
+        prepare = partial(prepared, until_goals=until_goals)
+        stream_study("selfcal", files, study, keys, every, map_file, span, streaming, output, prepare)
+        return 0
+    if until_goals:
+        raise InputError("--until-goals", "found without --stream, expected them together")
+    paths = recorded("selfcal", files, streaming, every)
+
+    from inercal.foundation._jit import compiling
+    from inercal.foundation.records.write import SUFFIXES
+    from inercal.systems.selfcal import verbs as system
+
+    output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
+    of, _ = study_in("selfcal", study, keys, output)
+    clock = time.perf_counter()
+    records = read_repeats(paths, map_file, output, span)
+    read_s = time.perf_counter() - clock
+    if len(records) > 1 and compare:
+        raise InputError("--compare", f"found {len(records)} runs, expected one")
+    if len(records) > 1 and output.out is not None and output.out.suffix.lower() in SUFFIXES:
+        raise InputError(output.out, f"found {len(records)} runs, expected one for a history, or .json")
+    of_all = " all" if compare else f" {of.settings.filter.kind}"
+    with compiling(f"selfcal{of_all}", output.say):
+        system.prepare(of, compare)
+    with working(output) as progress:
+        file = output.out is not None and output.out.suffix.lower() in SUFFIXES
+        outcome = system.calibrate(records, of, compare, progress, output.report is not None or file)
+    return give(outcome, output, read_s)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class FolderOutput(OutputOptions):
+    """The options of a command that writes a folder."""
+
+    out: Annotated[Path | None, Parameter(help="Folder of the outcome; made if it is not there.")] = None
+
+
+def batch(
+    manifest: Annotated[
+        Path, Parameter(help="Manifest (CSV with the columns serial and files), or a folder of recordings.")
+    ],
+    /,
+    *,
+    study: StudyFile,
+    map_file: MapFile = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
+    keep: Annotated[bool, Parameter(help="Keep the result, its files and report in the store.")] = False,
+    store: StoreOption = None,
+    overrides: Overrides = None,
+    output: FolderOutput = FolderOutput(),
+) -> int:
+    """Calibrate every unit of a fleet."""
+    from inercal.laboratory.fleet.batch import batch as of_fleet
+    from inercal.laboratory.fleet.batch import written
+    from inercal.laboratory.store import open_store
+
+    if output.out is None:
+        raise InputError("--out", "missing, expected a folder for the outcome")
+    count = count_of(workers, cluster)
+    if store is not None and not keep:
+        raise InputError("--store", "found without --keep, expected with it")
+    place = open_store(store).place.given if keep else None
+    clock = time.perf_counter()
+    with reading(output, "calibrating") as progress:
+        result = of_fleet(
+            manifest,
+            study,
+            out=output.out,
+            map=map_file,
+            overrides=overrides or (),
+            workers=count,
+            cluster=cluster,
+            store=place,
+            progress=progress or (lambda done, all: None),
+        )
+    estimate = replace(
+        result.estimate,
+        provenance={**result.estimate.provenance, "arguments": command_line()},
+        timing={"solve": time.perf_counter() - clock},
     )
+    for path in written(output.out):
+        output.say(f"written: {path}")
+    text = f"{result.table()}\n\n{estimate.status.value}: {estimate.message}".lstrip()
+    emit(estimate, text, output)
+    return 0 if estimate.status.value == "ok" else EXIT_BAD_VERDICT

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli.options import FileOutput, StoreOption
-from inercal.cli.outcome import emit
+from inercal.cli.outcome import tell
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.shown import aligned
 
 if TYPE_CHECKING:
-    from inercal.foundation.results.result import Estimate
     from inercal.laboratory.certificate.reading import Certificate
-    from inercal.laboratory.store import Store
 
 
 def certificate(
@@ -42,7 +40,7 @@ def certificate(
     html: Annotated[Path | None, Parameter(help="Write the certificate as a readable page.")] = None,
     read: Annotated[Path | None, Parameter(help="Read this certificate, of anybody, and print it.")] = None,
     store: StoreOption = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),
 ) -> None:
     """Write a digital calibration certificate, or read one."""
     if html is not None and html.suffix.lower() not in (".html", ".htm"):
@@ -84,107 +82,27 @@ def _write(
     output: FileOutput,
 ) -> None:
     """Write the certificate and its page, whole or not at all, and enter it into the store."""
-    from contextlib import AbstractContextManager, nullcontext
-    from datetime import UTC, datetime
-
-    from inercal.foundation._files import read_bytes, write_bytes, write_text
     from inercal.foundation.records.places import counted
     from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.result import without_coefficients
-    from inercal.laboratory.certificate.lab import read_lab
-    from inercal.laboratory.certificate.page import page
-    from inercal.laboratory.certificate.reading import certificate_of
-    from inercal.laboratory.certificate.written import certificate as written
-    from inercal.laboratory.issue import issuing
+    from inercal.laboratory.issue import issue
 
-    stated = read_lab(lab)
-    opened = _store(store)
-    reports: list[bytes | None] = []
-    for path in pages:
-        try:
-            reports.append(read_bytes(path))
-        except OSError as error:
-            raise InputError(path, f"cannot be read ({error.strerror}), expected a report") from error
-    reports += [None] * (len(results) - len(reports))
-    found = [_result(each, opened, report) for each, report in zip(results, reports, strict=True)]
-    estimates = [estimate for estimate, _ in found]
-    given = [report for _, report in found]
-    made = written(estimates, stated, number, datetime.now(UTC).date(), given, supersedes, lab)
     assert output.out is not None
-    readable = page(certificate_of(made, output.out))
-    entering: AbstractContextManager[None] = nullcontext()
-    if opened is not None:
-        kept = [
-            _kept(opened, each, estimate, report)
-            for each, (estimate, report) in zip(results, found, strict=True)
-        ]
-        entering = issuing(opened, number, made, readable.encode(), kept, supersedes)
-    with entering:
-        write_bytes(output.out, made)
-        if html is not None:
-            write_text(html, readable)
-            output.say(f"page: {html}")
+    estimates, where = issue(results, lab, number, output.out, html, supersedes, pages, store)
+    if html is not None:
+        output.say(f"page: {html}")
     count = sum(len(estimate.names) for estimate in estimates)
     of = f"{counted(count, 'coefficient')} of {counted(len(results), 'result')}"
     words = f"certificate {number}: {of} in {output.out}"
-    words += f", entered in {opened.where}" if opened is not None else "; no store keeps it or its number"
+    words += f", entered in {where}" if where else "; no store keeps it or its number"
     data = {"number": number, "out": str(output.out), "html": None if html is None else str(html)}
     sources = tuple(source_of(path) for path in (*map(Path, results), lab, *pages) if path.is_file())
-    emit(without_coefficients("certificate", words, data, sources), words, output)
-
-
-def _store(given: str | None) -> Store | None:
-    """The store that is named, by option or environment, or the user's own where there is one."""
-    import os
-
-    from inercal.laboratory.store import VARIABLE, open_store, place_of
-
-    folder = place_of(given).folder
-    if (
-        given is None
-        and VARIABLE not in os.environ
-        and (folder is None or not (folder / "store.db").is_file())
-    ):
-        return None
-    return open_store(given)
-
-
-def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
-    """A result of a file or of the store, and its report."""
-    from inercal.foundation.results.files import load
-
-    if Path(given).is_file() or store is None:
-        return load(given), report
-    from inercal.laboratory.catalog import show
-
-    shown = show(store, given)
-    kept = None if shown.report is None else store.objects.read(shown.report)
-    return shown.estimate, kept if report is None else report
-
-
-def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
-    """Identity of a result in the store, where it is kept first if it came as a file."""
-    from inercal.laboratory.catalog import find
-    from inercal.laboratory.keep import item_of, keep, kept_already, saved_in
-
-    if not Path(given).is_file():
-        return find(store, given)
-    saved, item = saved_in(Path(given), estimate), item_of(estimate)
-    known = kept_already(store, estimate, saved)
-    if known is None and item is None and estimate.names:
-        raise InputError(
-            given,
-            "found no instrument in it, expected [item] in its study, or that it is kept already, as by: inercal keep "
-            f'{given} --instrument "maker, model, serial"',
-        )
-    return keep(store, estimate, item, report, saved).id if known is None else known
+    tell(output, "certificate", words, data, sources)
 
 
 def _read(path: Path, html: Path | None, output: FileOutput) -> None:
     """Print what a certificate states, and write it as a page where that is asked for."""
     from inercal.foundation._files import write_text
     from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.result import without_coefficients
     from inercal.laboratory.certificate.page import page
     from inercal.laboratory.certificate.reading import read_certificate
 
@@ -215,7 +133,7 @@ def _read(path: Path, html: Path | None, output: FileOutput) -> None:
         ],
     }
     text = "\n".join([*_table(found), "", words])
-    emit(without_coefficients("certificate", words, result, (source_of(path),)), text, output)
+    tell(output, "certificate", words, result, (source_of(path),), text)
 
 
 def _table(found: Certificate) -> list[str]:

@@ -33,7 +33,7 @@ def design_positions(
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Find the positions of a turntable that calibrate best."""
     from inercal.foundation._files import write_text
@@ -56,7 +56,7 @@ def design_tolerances(
     /,
     *,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Find the cheapest tolerances of a turntable that reach wanted uncertainties."""
     from inercal.foundation._files import write_text
@@ -81,7 +81,7 @@ def design_selfcal(
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Find the path on which a platform calibrates itself best."""
     from inercal.foundation._files import write_text
@@ -107,7 +107,7 @@ def design_strapdown(
     /,
     *,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Say what the turns of a strapdown unit tell, and find better ones."""
     from inercal.foundation._files import write_text
@@ -133,7 +133,7 @@ def design_aoa(
     /,
     *,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Say what the sensors of a model can tell of its angle, and other layouts beside."""
     from inercal.foundation._jit import compiling
@@ -174,7 +174,7 @@ def sensitivity(
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Say which error of a turntable matters."""
     from inercal.systems.turntable import verbs as system

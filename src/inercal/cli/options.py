@@ -25,17 +25,16 @@ if TYPE_CHECKING:
     from inercal.faces.python.study import Study as StudyOfFile
     from inercal.foundation.computing.executors import Executor
     from inercal.foundation.findings import Finding
+    from inercal.foundation.records.maps import RecordMap
     from inercal.foundation.records.record import Record
 
 Files = Annotated[
     list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
 ]
-RunFiles = Annotated[
-    list[Path],
-    Parameter(
-        help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
-    ),
-]
+RUN_FILES = Parameter(
+    help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
+)
+RunFiles = Annotated[list[Path], RUN_FILES]
 MapFile = Annotated[
     Path | None, Parameter(name="--map", help="Column map (TOML) for files without canonical headers.")
 ]
@@ -253,14 +252,21 @@ def _read(
     span: Span,
 ) -> list[Record]:
     """Records by one of the readers, and the part of each that is asked for."""
-    from inercal.foundation.records.maps import read_map
-
     span.check()
-    record_map = None if map_file is None else read_map(map_file)
+    record_map = map_in(map_file)
     with reading(output) as progress:
         records = read(files, record_map, progress)
     output.spare(source.path for record in records for source in record.sources)
     return [span.of(record) for record in records]
+
+
+def map_in(map_file: Path | None) -> RecordMap | None:
+    """The column map of a file that was named, None without one; raises `inercal.foundation.errors.MapError`."""
+    if map_file is None:
+        return None
+    from inercal.foundation.records.maps import read_map  # brings a checker of files that is slow to load
+
+    return read_map(map_file)
 
 
 def study_in(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from inercal.cli import EXIT_BAD_VERDICT, command_line, process_age
 from inercal.cli.options import OutputOptions, ReportOutput, ResultOutput
@@ -13,6 +13,7 @@ from inercal.cli.options import OutputOptions, ReportOutput, ResultOutput
 if TYPE_CHECKING:
     from inercal.faces.python.result import Result
     from inercal.foundation.findings import Finding
+    from inercal.foundation.inputs import Source
     from inercal.foundation.results.result import Estimate
 
 WHOLE = (".json", ".toml")
@@ -43,6 +44,26 @@ def emit(estimate: Estimate, text: str, output: OutputOptions) -> None:
     from inercal.foundation.results.files import to_json
 
     output.emit(to_json(timed(estimate)) if output.json else {}, text)
+
+
+def tell(
+    output: OutputOptions,
+    command: str,
+    words: str,
+    data: Mapping[str, Any],
+    sources: Iterable[Source] = (),
+    text: str | None = None,
+    **stated: Any,
+) -> None:
+    """The outcome of a command that estimates nothing: ``words``, or ``text`` for people, and the JSON of all.
+
+    ``stated`` as of `inercal.foundation.results.result.without_coefficients`.
+    """
+    from inercal.foundation.results.result import without_coefficients
+
+    emit(
+        without_coefficients(command, words, data, sources, **stated), words if text is None else text, output
+    )
 
 
 def hand_over(

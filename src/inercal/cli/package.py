@@ -1,19 +1,102 @@
-"""``inercal examples``, ``schema``, ``completion`` and ``validate``: what comes with the package."""
+"""Beginnings, and what ships: ``inercal new``, ``examples``, ``schema``, ``completion`` and ``validate``."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from inercal.cli import process_age, show
-from inercal.cli.options import FileOutput, ResultOutput, reading
-from inercal.cli.outcome import WHOLE, emit, hand_over
+from inercal.cli.options import FileOutput, Overrides, ResultOutput, reading
+from inercal.cli.outcome import WHOLE, hand_over, tell
 from inercal.foundation.errors import InputError
 
+Rate = Annotated[
+    str | None,
+    Parameter(help='Sample rate of recordings without a time column, for the map: "100 Hz", "100.00(1) Hz".'),
+]
+Recordings = Annotated[list[Path] | None, Parameter(help="Recordings, to guess a column map from.")]
 
-def validate(*, output: ResultOutput = ResultOutput()) -> int:  # noqa: B008  (frozen)
+
+def _beginning(kind: str) -> Callable[..., None]:
+    """The command that writes a study of a kind, and a map guessed from recordings that need one."""
+
+    def command(
+        files: Recordings = None,
+        /,
+        *,
+        rate: Rate = None,
+        overrides: Overrides = None,
+        output: FileOutput = FileOutput(),
+    ) -> None:
+        _new(kind, files or [], overrides or [], output, rate)
+
+    return command
+
+
+new_aoa = _beginning("aoa")
+new_imu = _beginning("imu")
+new_selfcal = _beginning("selfcal")
+new_strapdown = _beginning("strapdown")
+new_turntable = _beginning("turntable")
+
+
+def new_lab(
+    *,
+    overrides: Overrides = None,
+    output: FileOutput = FileOutput(),
+) -> None:
+    """Write what a laboratory states in its certificates, to be filled in."""
+    from inercal.foundation._files import write_text
+    from inercal.laboratory.certificate.lab import lab_template
+
+    output.check((".toml",))
+    path = output.out or Path("lab.toml")
+    if path.exists():
+        raise InputError(path, "exists already, expected a new file name (--out)")
+    write_text(path, lab_template(path, overrides or ()))
+    words = f'{path}: fill in each "?" and look it over'
+    tell(output, "new lab", words, {"lab": str(path)})
+
+
+def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
+    """Write a study of that kind, and the map if there is one; nothing is overwritten."""
+    from inercal.faces.python.study import begun, mapped
+    from inercal.faces.studies.starting import UNKNOWN
+    from inercal.foundation._files import write_text
+    from inercal.foundation.records.read import source_of
+    from inercal.foundation.units import parse_quantity
+
+    output.check((".toml",), files)
+    if rate is not None:
+        if not parse_quantity(rate, "frequency", "--rate", "100 Hz").value > 0.0:
+            raise InputError("--rate", f"found {rate}, expected a rate above 0")
+        if not files:
+            raise InputError("--rate", "found without a recording, expected one for the map")
+    study = output.out or Path(f"{kind}.toml")
+    beside = study.with_name(f"{study.stem}-map{study.suffix}")
+    text, column_map = begun(kind, files, study, beside, rate, overrides)
+    map_file = None if column_map is None else beside
+    written = [study] if map_file is None else [study, map_file]
+    for path in written:
+        if path.exists():
+            raise InputError(path, "exists already, expected a new file name (--out)")
+    write_text(study, text)
+    if map_file is not None and column_map is not None:
+        write_text(map_file, column_map)
+    result = {"study": str(study), "map": None if map_file is None else str(map_file)}
+    words = "\n".join(f"{path}: look it over and correct it" for path in written)
+    if f'= "{UNKNOWN}" ' in text:
+        words = words.replace("look it over and correct it", f'fill in each "{UNKNOWN}" and look it over', 1)
+    if column_map is not None and not mapped(column_map):
+        words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
+    tell(output, f"new {kind}", words, result, map(source_of, files))
+
+
+def validate(*, output: ResultOutput = ResultOutput()) -> int:
     """Rerun the published and closed-form cases."""
     from inercal.faces.report.validation import page, table
     from inercal.faces.validate.run import executor
@@ -31,29 +114,25 @@ def examples(
     name: Annotated[str | None, Parameter(help="The example to copy; all are listed if absent.")] = None,
     /,
     *,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),
 ) -> None:
     """List the recordings that ship with inercal, or copy one."""
     from pathlib import Path
 
     from inercal.examples import EXAMPLES, FOLDER, shipped
-    from inercal.foundation._files import read_bytes, write_bytes
-    from inercal.foundation.results.result import without_coefficients
+    from inercal.foundation._files import make_folder, read_bytes, write_bytes
 
     if name is None:
         if output.out is not None:
             raise InputError("--out", "found no example to copy, expected its name before")
         rows = [{"name": e.name, "title": e.title, "files": list(e.files)} for e in EXAMPLES.values()]
         text = "\n".join(f"{e.name:11s} {e.title}" for e in EXAMPLES.values())
-        emit(without_coefficients("examples", f"{len(rows)} examples", {"examples": rows}), text, output)
+        tell(output, "examples", f"{len(rows)} examples", {"examples": rows}, text=text)
         return
     if name not in EXAMPLES:
         raise InputError(name, f"no such example, expected one of {', '.join(EXAMPLES)}")
     example, folder = EXAMPLES[name], output.out or Path(name)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(folder, f"cannot be made ({error.strerror})") from error
+    make_folder(folder)
     for file in example.files:
         target = folder / Path(file).name
         if target.exists() and read_bytes(target) != read_bytes(FOLDER / file):
@@ -62,11 +141,11 @@ def examples(
         write_bytes(folder / Path(file).name, read_bytes(FOLDER / file))
     result = {"folder": str(folder), "run": example.command(str(folder))}
     sources = map(shipped, example.files)
-    estimate = without_coefficients("examples", f"copied to {folder}", result, sources)
-    emit(estimate, f"{estimate.message}; now run\n{result['run']}", output)
+    words = f"copied to {folder}"
+    tell(output, "examples", words, result, sources, f"{words}; now run\n{result['run']}")
 
 
-def schema(*, output: FileOutput = FileOutput()) -> None:  # noqa: B008  (frozen)
+def schema(*, output: FileOutput = FileOutput()) -> None:
     """Print the JSON Schema of study files."""
     import json
 
@@ -102,11 +181,10 @@ def completion(
     shell: Annotated[Shell, Parameter(help="The shell to complete in.")],
     /,
     *,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),
 ) -> None:
     """Print the script by which a shell completes commands."""
     from inercal.foundation._files import write_text
-    from inercal.foundation.results.result import without_coefficients
 
     output.check(())
     text = script(shell)
@@ -114,11 +192,7 @@ def completion(
         write_text(output.out, text)
         output.say(f"completion: {output.out}")
     shown = text.rstrip("\n") if output.out is None else ""
-    emit(
-        without_coefficients("completion", f"completion for {shell}", {"shell": shell, "text": text}),
-        shown,
-        output,
-    )
+    tell(output, "completion", f"completion for {shell}", {"shell": shell, "text": text}, text=shown)
 
 
 def script(shell: Shell) -> str:

@@ -25,8 +25,8 @@ def inspect(
     /,
     *,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    span: Span = Span(),
+    output: ReportOutput = ReportOutput(),
 ) -> None:
     """Look at a recording before it is used."""
     from inercal.faces.report.inspection import (
@@ -68,11 +68,11 @@ def allan(
     /,
     *,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    span: Span = Span(),
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Tell the noise of an instrument at rest."""
-    from inercal.faces.python.noise import allan as noise_of
+    from inercal.faces.python.verbs import allan as noise_of
     from inercal.faces.report.allan import curves_csv
     from inercal.foundation._files import write_text
 
@@ -96,8 +96,8 @@ def monitor(
     *,
     map_file: MapFile = None,
     every: Every = None,
-    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
+    streaming: StreamOptions = StreamOptions(),
+    output: OutputOptions = OutputOptions(),
 ) -> None:
     """Tell rest from motion, live, and measure the noise at rest."""
     from inercal.faces.stream.estimators import monitor as prepared

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
 from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
-from inercal.cli.outcome import WHOLE, emit, give, say_findings
+from inercal.cli.outcome import WHOLE, emit, give, say_findings, tell
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.foundation.errors import InputError
 
@@ -35,7 +35,7 @@ def apply(
     /,
     *,
     map_file: MapFile = None,
-    span: Span = Span(),  # noqa: B008  (frozen)
+    span: Span = Span(),
     invert: Annotated[bool, Parameter(help="From true values to outputs of the instrument.")] = False,
     uncertainty: Annotated[
         bool, Parameter(help="Also write the standard uncertainty of each corrected value (u_acc_x, ...).")
@@ -43,8 +43,8 @@ def apply(
     stream: Annotated[
         bool, Parameter(help="Lines in, from standard input or one FILE, and corrected lines out.")
     ] = False,
-    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    streaming: StreamOptions = StreamOptions(),
+    output: FileOutput = FileOutput(),
 ) -> None:
     """Correct a recording with a calibration."""
     if stream:
@@ -64,7 +64,6 @@ def apply(
     from inercal.faces.python.calibrations import worth_saying
     from inercal.foundation.records.read import source_of
     from inercal.foundation.records.write import SUFFIXES, write_record
-    from inercal.foundation.results.result import without_coefficients
 
     paths = recorded("apply", files, streaming)
     if output.out is None:
@@ -79,7 +78,7 @@ def apply(
     result = {"out": str(output.out), "rows": len(next(iter(record.columns.values())).t)}
     words = f"{result['rows']} rows written to {output.out}"
     inputs = (*record.sources, source_of(calibration))
-    emit(without_coefficients("apply", words, result, inputs, findings), words, output)
+    tell(output, "apply", words, result, inputs, findings=findings)
 
 
 def usable(
@@ -105,23 +104,16 @@ def compare(
     second: Annotated[Path, Parameter(help="The later one, of the same instrument.")],
     /,
     *,
-    output: ResultOutput = ResultOutput(),  # noqa: B008  (frozen)
+    output: ResultOutput = ResultOutput(),
 ) -> int:
     """Compare two calibrations of one instrument."""
-    from inercal.faces.python.calibrations import of_comparison, read_estimate
-    from inercal.foundation.records.read import source_of
-    from inercal.foundation.results.compare import Saved
-    from inercal.foundation.results.compare import compare as compared
+    from inercal.faces.python.calibrations import compare as compared
 
     output.check(WHOLE, (first, second))
     clock = time.perf_counter()
-    files = [Saved(read_estimate(path), str(path)) for path in (first, second)]
-    inputs = (source_of(first), source_of(second))
-    read = time.perf_counter()
-    estimate = compared(*files)
-    timing = {"solve": time.perf_counter() - read}
-    result = of_comparison(replace(estimate, inputs=inputs, timing=timing), files[0].estimate)
-    return give(result, output, read - clock, "comparison")
+    result = compared(first, second)
+    read_s = time.perf_counter() - clock - result.estimate.timing["solve"]
+    return give(result, output, read_s, "comparison")
 
 
 Tool = Literal["imu_tk", "imucal", "kalibr", "psins"]
@@ -144,7 +136,7 @@ def convert(
     gyro_unit: Annotated[
         str | None, Parameter(help="With --from: unit of the gyro's outputs, if the file states none.")
     ] = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
+    output: FileOutput = FileOutput(),
 ) -> int:
     """Convert a calibration to or from another tool's."""
     from inercal.faces.convert.noise_files import noise_to_tool

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -20,9 +20,10 @@ from inercal.cli.options import (
     WorkersOption,
     count_of,
     reading,
+    study_in,
     whole_number,
 )
-from inercal.cli.outcome import WHOLE, emit, hand_over
+from inercal.cli.outcome import WHOLE, hand_over, tell
 from inercal.foundation.errors import InputError
 
 Seed = Annotated[
@@ -33,40 +34,26 @@ _MOST_RUNS = 1_000_000
 """Runs whose results fit into memory; hours of work."""
 
 
-def simulate_turntable(
-    study: Study,
-    /,
-    *,
-    seed: Seed = 1,
-    overrides: Overrides = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
-) -> None:
-    """Simulate a test of an instrument on a turntable."""
-    _simulated("turntable", study, seed, overrides, output)
+def _simulating(kind: str) -> Callable[..., None]:
+    """The command that simulates a test once, by a study of a kind."""
+
+    def command(
+        study: Study,
+        /,
+        *,
+        seed: Seed = 1,
+        overrides: Overrides = None,
+        output: FileOutput = FileOutput(),
+    ) -> None:
+        _simulated(kind, study, seed, overrides, output)
+
+    return command
 
 
-def simulate_imu(
-    study: Study,
-    /,
-    *,
-    seed: Seed = 1,
-    overrides: Overrides = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
-) -> None:
-    """Simulate an IMU by hand in many poses, in six positions and three turns, or on a table."""
-    _simulated("imu", study, seed, overrides, output)
-
-
-def simulate_strapdown(
-    study: Study,
-    /,
-    *,
-    seed: Seed = 1,
-    overrides: Overrides = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
-) -> None:
-    """Simulate a strapdown unit that rests and is turned."""
-    _simulated("strapdown", study, seed, overrides, output)
+simulate_aoa = _simulating("aoa")
+simulate_imu = _simulating("imu")
+simulate_strapdown = _simulating("strapdown")
+simulate_turntable = _simulating("turntable")
 
 
 def simulate_selfcal(
@@ -85,7 +72,7 @@ def simulate_selfcal(
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
     overrides: Overrides = None,
-    output: ReportOutput = ReportOutput(),  # noqa: B008  (frozen)
+    output: ReportOutput = ReportOutput(),
 ) -> int:
     """Simulate a platform that turns through the plan of a study, once or many times."""
     if runs is not None:
@@ -103,18 +90,6 @@ def simulate_selfcal(
     return 0
 
 
-def simulate_aoa(
-    study: Study,
-    /,
-    *,
-    seed: Seed = 1,
-    overrides: Overrides = None,
-    output: FileOutput = FileOutput(),  # noqa: B008  (frozen)
-) -> None:
-    """Simulate a wind-tunnel model that moves as its study plans."""
-    _simulated("aoa", study, seed, overrides, output)
-
-
 def _campaign(
     study: Path,
     runs: int,
@@ -125,7 +100,6 @@ def _campaign(
     output: ReportOutput,
 ) -> int:
     """Many simulated calibrations; exit code 1 where the stated uncertainties are too small."""
-    from inercal.faces.python.study import read_study
     from inercal.foundation._jit import compiling
     from inercal.foundation.computing.cluster import Cluster
     from inercal.foundation.computing.executors import Threads
@@ -142,7 +116,7 @@ def _campaign(
     output.check(WHOLE, (study,))
     workers, cluster = count_of(*place), place[1]
     executor = Threads(workers) if cluster is None else Cluster(cluster, workers)
-    of = read_study("selfcal", study, overrides)
+    of, _ = study_in("selfcal", study, overrides, output)
     settings = of.settings
     with of.at_fault():
         with compiling(f"campaign {settings.filter.kind}", output.say_now):
@@ -171,16 +145,6 @@ def _campaign(
     return hand_over(estimate, [outcome.table()], page, output, "campaign")
 
 
-def _check(study: Path, seed: int, output: FileOutput) -> None:
-    """Fail before any work is done where a result could not be written."""
-    from inercal.foundation.records.write import SUFFIXES
-
-    if output.out is None:
-        raise InputError("--out", "missing, expected the file to write, such as simulated.csv")
-    _not_negative(seed)
-    output.check(SUFFIXES, (study,))
-
-
 def _not_negative(seed: int) -> None:
     """Refuse a seed below 0."""
     if seed < 0:
@@ -196,11 +160,12 @@ def _simulated(
     from inercal.faces.python.study import read_study
     from inercal.faces.python.verbs import simulate
     from inercal.foundation.records.read import source_of
-    from inercal.foundation.records.write import write_record
-    from inercal.foundation.results.result import without_coefficients
+    from inercal.foundation.records.write import SUFFIXES, write_record
 
-    _check(study, seed, output)
-    assert output.out is not None
+    if output.out is None:
+        raise InputError("--out", "missing, expected the file to write, such as simulated.csv")
+    _not_negative(seed)
+    output.check(SUFFIXES, (study,))
     of = read_study(kind, study, overrides or ())
     inputs = of.files_without(of.system.unsimulated)
     output.spare(inputs)
@@ -211,8 +176,4 @@ def _simulated(
     words = f"{rows} rows written to {output.out}"
     result = {"out": str(output.out), "rows": rows, "seed": seed, "columns": list(record.columns)}
     sources = map(source_of, inputs)
-    emit(
-        without_coefficients(f"simulate {kind}", words, result, sources, settings=of.keys, seed=seed),
-        words,
-        output,
-    )
+    tell(output, f"simulate {kind}", words, result, sources, settings=of.keys, seed=seed)

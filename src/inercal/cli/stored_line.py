@@ -155,7 +155,7 @@ def stored_line(arguments: object) -> StoredLine:
     except CycloptsError as error:
         raise InputError(_WHERE, refused(root, error)) from error
     verb, kind = (*chain, "")[:2]
-    if f"{function.__module__}:{function.__name__}" != COMMANDS[verb, kind][0]:
+    if function.__module__ != COMMANDS[verb, kind][0].partition(":")[0]:
         raise InputError(_WHERE, f"found a question for help, expected `inercal {command}` with its files")
     given = dict(_given(root[verb][kind] if kind else root[verb], bound.arguments))
     for name in given:

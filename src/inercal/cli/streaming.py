@@ -16,24 +16,27 @@ from cyclopts import Parameter
 
 from inercal.cli import abandon_output
 from inercal.cli.options import (
+    RUN_FILES,
     CheckpointOption,
     FileOutput,
     OutputOptions,
     ReportOutput,
     ResultOutput,
     Span,
+    map_in,
     whole_number,
 )
 from inercal.foundation.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:
     from inercal.faces.stream.lines import Lines
-    from inercal.faces.stream.run import Recursive
+    from inercal.faces.stream.run import Recursive, Saving
 
     Estimators = Callable[[Lines], Recursive[Any]]
 
 _STANDARD_INPUT = "standard input"
 
+StreamedFiles = Annotated[list[Path] | None, RUN_FILES]
 StreamFile = Annotated[
     Path | None, Parameter(help="Recording, pipe or device to read lines from; standard input if absent.")
 ]
@@ -75,6 +78,13 @@ class StreamOptions:
         from inercal.foundation.units import parse_quantity
 
         return -math.inf if self.after is None else parse_quantity(self.after, "time", "--after").value
+
+    @property
+    def saving(self) -> Saving | None:
+        """The file that the state is saved in, and how often; None where nothing is saved."""
+        from inercal.faces.stream.run import Saving
+
+        return None if self.checkpoint is None else Saving(self.checkpoint, self.checkpoint_every)
 
     def check(self, output: OutputOptions, inputs: Iterable[Path | None]) -> None:
         """Fail before any work is done where lines or state could not be written; raises `InputError`."""
@@ -129,7 +139,6 @@ def recorded(
 
 def stream_study(
     kind: str,
-    prepare: Callable[[Any, float, ResultOutput], Estimators],
     files: list[Path] | None,
     study: Path,
     keys: list[str],
@@ -138,22 +147,28 @@ def stream_study(
     span: Span,
     options: StreamOptions,
     output: ResultOutput,
-) -> None:
-    """Run the estimator of a study on a stream; ``prepare`` takes its settings, the interval [s] and the output."""
+    prepare: Callable[..., Estimators] | None = None,
+) -> Recursive[Any]:
+    """Run the estimator of a study on a stream, and give it back; ``prepare`` stands for that of the system."""
     from inercal.faces.python.study import read_study
 
     span.refuse("a stream")
     file, interval = streamed(files), interval_of(every)
     options.check(output, (file, map_file, study))
     of = read_study(kind, study, keys)
+    prepare = prepare or of.system.stream
+    assert prepare is not None
     with of.at_fault():
-        make = prepare(of.settings, interval, output)
+        make = prepare(of.settings, interval, output.say, output.say_finding)
+    made: list[Recursive[Any]] = []
 
     def estimator(lines: Lines) -> Recursive[Any]:
         with of.at_fault():
-            return make(lines)
+            made.append(make(lines))
+        return made[-1]
 
     run_stream(estimator, file, map_file, output, options)
+    return made[-1]
 
 
 def run_stream(
@@ -168,24 +183,24 @@ def run_stream(
     A reader that leaves ends it in order; the lines it did not take are given again after a restart.
     """
     from inercal.faces.stream.lines import Lines
-    from inercal.faces.stream.run import Saving, run
+    from inercal.faces.stream.run import run
 
-    record_map = None
-    if map_file is not None:
-        from inercal.foundation.records.maps import read_map  # brings a checker of files that is slow to load
-
-        record_map = read_map(map_file)
-    saving = None if options.checkpoint is None else Saving(options.checkpoint, options.checkpoint_every)
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
+    record_map = map_in(map_file)
+    settle_lines()
     with _opened(file) as stream:
         where = _STANDARD_INPUT if file is None else str(file)
         lines = Lines(stream, where, record_map, output.say_finding)
         try:
-            run(estimator(lines), lines, _write, saving, output.say, options.received)
+            run(estimator(lines), lines, _write, options.saving, output.say, options.received)
         except BrokenPipeError:
             abandon_output()
             output.say("the reader of standard output has left")
+
+
+def settle_lines() -> None:
+    """Write lines on standard output as in a file: UTF-8, and the same line ends everywhere."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8", newline="\n")
 
 
 def _opened(file: Path | None) -> Any:

@@ -21,21 +21,21 @@ if TYPE_CHECKING:
 #: verb, kind -> where it is, what it does, an example that runs
 COMMANDS = {
     ("new", "imu"): (
-        "inercal.cli.new:new_imu",
+        "inercal.cli.package:new_imu",
         "Write a commented study for `inercal calibrate imu`.\n\nGiven a recording, also a column map guessed from "
         "it. The study goes to --out (imu.toml if absent), the map beside it (imu-map.toml). Nothing that exists "
         "is overwritten.",
         'inercal new imu log.csv --set site.latitude="48.1 deg" --out imu.toml',
     ),
     ("new", "strapdown"): (
-        "inercal.cli.new:new_strapdown",
+        "inercal.cli.package:new_strapdown",
         "Write a commented study of a strapdown unit: of its simulation and its calibration.\n\nGiven a recording "
         "whose header does not say quantities and units, also a column map guessed from it. The study goes to --out "
         "(strapdown.toml if absent), the map beside it (strapdown-map.toml). Nothing that exists is overwritten.",
         "inercal new strapdown --out strapdown.toml",
     ),
     ("new", "turntable"): (
-        "inercal.cli.new:new_turntable",
+        "inercal.cli.package:new_turntable",
         "Write a commented study of a turntable: of its sensitivity, design, simulation and calibration.\n\nGiven a "
         "recording, it is for the instrument in it; where the header does not say quantities and units, a column map "
         "is guessed too. The study goes to --out (turntable.toml if absent), the map beside it (turntable-map.toml). "
@@ -43,21 +43,21 @@ COMMANDS = {
         "inercal new turntable --out turntable.toml",
     ),
     ("new", "selfcal"): (
-        "inercal.cli.new:new_selfcal",
+        "inercal.cli.package:new_selfcal",
         "Write a commented study of a self-calibration: of its simulation, path design and estimation.\n\nGiven a "
         "recording whose header does not say quantities and units, also a column map guessed from it. The study goes "
         "to --out (selfcal.toml if absent), the map beside it (selfcal-map.toml). Nothing that exists is overwritten.",
         "inercal new selfcal --out selfcal.toml",
     ),
     ("new", "aoa"): (
-        "inercal.cli.new:new_aoa",
+        "inercal.cli.package:new_aoa",
         "Write a commented study of an angle of attack: of its simulation and its measurement.\n\nGiven a recording "
         "whose header does not say quantities and units, also a column map guessed from it. The study goes to --out "
         "(aoa.toml if absent), the map beside it (aoa-map.toml). Nothing that exists is overwritten.",
         "inercal new aoa --out aoa.toml",
     ),
     ("new", "lab"): (
-        "inercal.cli.new:new_lab",
+        "inercal.cli.package:new_lab",
         "Write a commented lab.toml: what a laboratory states in its certificates.\n\nIt goes to --out (lab.toml if "
         "absent). Nothing that exists is overwritten.",
         "inercal new lab --out lab.toml",
@@ -96,7 +96,7 @@ COMMANDS = {
         "inercal calibrate turntable test.csv --study turntable.toml",
     ),
     ("selfcal", ""): (
-        "inercal.cli.selfcal:selfcal",
+        "inercal.cli.calibrate:selfcal",
         "Calibrate a gimbaled platform, or hybrid system, from a recording made while it turns.\n\nGives bias, "
         "misalignment and scale factor of gyros and accelerometers with uncertainties, and what the path could not "
         "tell. --filter chooses the estimator, --compare runs all. --out saves the coefficients (.json or .toml), or "

@@ -27,6 +27,34 @@ def read_bytes(path: str | Path) -> bytes:
         return file.read()
 
 
+def input_bytes(path: str | Path, expected: str, refusal: type[InputError] = InputError) -> bytes:
+    """The bytes of a file that was named; raises ``refusal``, which ends in what was ``expected``."""
+    try:
+        return read_bytes(path)
+    except OSError as error:
+        raise refusal(path, f"cannot be read ({error.strerror or error}), expected {expected}") from error
+    except ValueError as error:  # a NUL in the path
+        raise refusal(repr(str(path)), f"{error}, expected {expected}") from error
+
+
+def input_text(path: str | Path, expected: str, refusal: type[InputError] = InputError) -> str:
+    """The text, in UTF-8, of a file that was named; raises as `input_bytes`."""
+    try:
+        return input_bytes(path, expected, refusal).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise refusal(path, f"byte {error.start} is not UTF-8 text, expected {expected}") from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those it lies in, unless it is there; raises `InputError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            folder, f"cannot be made ({error.strerror}), expected a folder that can be written"
+        ) from error
+
+
 @contextmanager
 def replacing(path: str | Path, mode: str = "wb") -> Iterator[IO[Any]]:
     """Open a temporary file beside ``path`` that takes its place only when the block ends without error.
@@ -72,10 +100,10 @@ def _permissions(target: Path) -> int:
     try:
         return stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:
-        return 0o666 & ~_umask()
+        return 0o666 & ~umask()
 
 
-def _umask() -> int:
+def umask() -> int:
     """The process's file mode mask (which can only be read by setting it)."""
     mask = os.umask(0)
     os.umask(mask)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from inercal.foundation._files import read_bytes
+from inercal.foundation._files import input_text
 from inercal.foundation.errors import InputError
 from inercal.foundation.keys import in_place_of, keys_of
 from inercal.foundation.units import shown
@@ -29,15 +29,10 @@ M = TypeVar("M", bound=BaseModel)
 
 def read_toml(path: str | Path, error: type[InputError]) -> dict[str, Any]:
     """Parse a TOML file; raises ``error`` naming file, line and column."""
-    text = ""
+    text = input_text(path, "a TOML file", error)
     try:
-        text = read_bytes(path).decode("utf-8-sig")
         return tomllib.loads(text)
-    except OSError as problem:
-        raise error(path, f"cannot be read ({problem.strerror}), expected a TOML file") from problem
-    except UnicodeDecodeError as problem:
-        raise error(path, f"byte {problem.start} is not UTF-8 text, expected a TOML file") from problem
-    except ValueError as problem:  # a TOMLDecodeError, an integer of thousands of digits, a NUL in the path
+    except ValueError as problem:  # a TOMLDecodeError, an integer of thousands of digits
         twice = _given_twice(text, str(problem))
         raise error(path, twice or f"not valid TOML: {str(problem)[:200]}") from problem
     except RecursionError as problem:

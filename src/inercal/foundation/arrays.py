@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
@@ -14,6 +15,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 """Numbers in SI and radians; batch axes lead, vector axes trail."""
+
+
+def finite(value: float) -> float | None:
+    """A finite number, else None, as JSON and a database have it."""
+    return value if math.isfinite(value) else None
+
 
 K = TypeVar("K")
 T = TypeVar("T")

@@ -66,8 +66,6 @@ class Key:
         Field of the same settings that takes the standard uncertainty of the quantity.
     several : bool
         A list of quantities.
-    exact : bool
-        A quantity that is refused with an uncertainty.
     least, most : float or None
         Bounds of a plain number; ``least`` of a list is its length.
     """
@@ -80,7 +78,6 @@ class Key:
     name: str = ""
     u: str = ""
     several: bool = False
-    exact: bool = False
     least: float | None = None
     most: float | None = None
 
@@ -98,7 +95,6 @@ def quantity(
     bounds: Bounds = ANYTHING,
     name: str = "",
     u: str = "",
-    exact: bool = False,
 ) -> Any:
     """A field that a study states as a text with a unit.
 
@@ -107,7 +103,7 @@ def quantity(
     """
     text = default if isinstance(default, str) else ""
     value = parse_quantity(text, dimension, says).value if text else default
-    key = Key(says, dimension, text, example or text, bounds, name, u, exact=exact)
+    key = Key(says, dimension, text, example or text, bounds, name, u)
     return dataclasses.field(default=value, metadata={"key": key})
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from inercal.foundation._files import read_bytes, write_bytes
+from inercal.foundation._files import input_bytes, read_bytes, write_bytes
 from inercal.foundation.errors import InputError, plain
 from inercal.foundation.results.result import Estimate
 from inercal.laboratory.catalog import ShownResult
@@ -108,12 +108,7 @@ def _bytes(store: Store, path: str, sha256: str, place: str | None) -> bytes:
         return store.objects.read(sha256)
     import hashlib
 
-    try:
-        data = read_bytes(place)
-    except OSError as error:
-        raise InputError(
-            place, f"cannot be read ({error.strerror}), expected {path}, kept by reference"
-        ) from error
+    data = input_bytes(place, f"{path}, kept by reference")
     if hashlib.sha256(data).hexdigest() != sha256:
         raise InputError(place, f"was changed, expected {path} as it was, kept by reference")
     return data

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -12,12 +11,10 @@ from typing import Any
 
 from sqlalchemy import Connection, Table, insert, select
 
+from inercal.foundation._files import umask
 from inercal.foundation.errors import InputError
 from inercal.laboratory.check import check
-from inercal.laboratory.database import engine_of, migrate, reading, writing
-from inercal.laboratory.objects import Objects
-from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Certified,
     IssuedCertificate,
     Setting,
@@ -30,7 +27,14 @@ from inercal.laboratory.tables import (
     Supersession,
     Tables,
     Used,
+    engine_of,
+    migrate,
+    numbered,
+    reading,
+    writing,
 )
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import SCRUB, Store, digest_of, happened, open_store, place_of, scrubbed, told
 
 Progress = Callable[[int, int], None] | None
 
@@ -49,20 +53,13 @@ def export_store(store: Store, folder: Path, progress: Progress = None) -> Store
         raise InputError(folder, f"cannot be made ({error.strerror})") from error
     try:
         _copy(store, made, progress)
-        made.chmod(0o777 & ~_mask())
+        made.chmod(0o777 & ~umask())
         made.replace(folder)
     except OSError as error:
         raise InputError(folder, f"cannot be made ({error.strerror})") from error
     finally:
         shutil.rmtree(made, ignore_errors=True)
     return open_store(str(folder))
-
-
-def _mask() -> int:
-    """The process's file mode mask."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _copy(store: Store, folder: Path, progress: Progress) -> None:
@@ -72,7 +69,7 @@ def _copy(store: Store, folder: Path, progress: Progress) -> None:
     # the lock of a writer, so that all tables are of one moment
     with writing(store.engine, store.where) as source, writing(engine, str(folder)) as target:
         for table in Tables.metadata.sorted_tables:
-            rows = [dict(row) for row in source.execute(select(table)).mappings()]
+            rows = _rows(source, table)
             if table.name == Setting.__tablename__:
                 rows = [row for row in rows if row["key"] != "objects"]
             if rows:
@@ -122,14 +119,8 @@ def _rows(connection: Connection, table: Table) -> list[dict[str, Any]]:
 
 def _merged(target: Connection, theirs: dict[str, list[dict[str, Any]]], head: str) -> Imported:
     """The rows of another store that are new, added with an event each."""
-    numbers = {
-        row["id"]: _number(target, StoredInstrument, row, ("maker", "model", "serial"))
-        for row in theirs["instrument"]
-    }
-    references = {
-        row["id"]: _number(target, StoredReference, row, ("name", "serial", "certificate", "valid_until"))
-        for row in theirs["reference"]
-    }
+    numbers = {row["id"]: numbered(target, StoredInstrument, row) for row in theirs["instrument"]}
+    references = {row["id"]: numbered(target, StoredReference, row) for row in theirs["reference"]}
     files = set(target.execute(select(StoredFile.sha256)).scalars())
     _insert(target, StoredFile, [row for row in theirs["recording"] if row["sha256"] not in files])
     there = set(target.execute(select(StoredResult.id)).scalars())
@@ -173,19 +164,3 @@ def _insert(connection: Connection, table: type[Tables], rows: list[dict[str, An
     """Insert rows into a table."""
     if rows:
         connection.execute(insert(table), rows)
-
-
-def _number(
-    connection: Connection,
-    table: type[StoredInstrument | StoredReference],
-    row: dict[str, Any],
-    keys: tuple[str, ...],
-) -> int:
-    """The primary key in this store of a row of another store; a new row is added."""
-    columns = table.__table__.columns
-    same = [columns[key] == row[key] for key in keys]
-    number: int | None = connection.execute(select(columns["id"]).where(*same)).scalar()
-    if number is None:
-        own = {key: value for key, value in row.items() if key != "id"}
-        number = connection.execute(insert(table).values(**own).returning(columns["id"])).scalar_one()
-    return number

@@ -1,4 +1,4 @@
-"""Contents of a store: instruments, results, one result whole."""
+"""Contents of a store: instruments, results, one result whole; and a result that takes the place of another."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import func, insert, select
 
+from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import from_json
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.database import reading
-from inercal.laboratory.keep import Item
-from inercal.laboratory.store import Store
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Certified,
     IssuedCertificate,
     SourceOf,
@@ -26,10 +24,18 @@ from inercal.laboratory.tables import (
     StoredResult,
     Supersession,
     Used,
+    reading,
+    writing,
 )
+from inercal.laboratory.keep import Item
+from inercal.laboratory.store import Store, digest_of, happened, now
 
 SHORT = 10
 """Digits of an identity that are shown."""
+
+
+_OWN = ("id", "command", "status", "message", "made", "measured", "operator", "version")
+"""Columns of a result that a list has."""
 
 
 @dataclass(frozen=True)
@@ -118,19 +124,8 @@ def _listed() -> Any:
     """The query of all results."""
     return (
         select(
-            StoredResult.id,
-            StoredResult.command,
-            StoredResult.status,
-            StoredResult.message,
-            StoredResult.made,
-            StoredResult.measured,
-            StoredResult.operator,
-            StoredResult.version,
-            StoredInstrument.maker,
-            StoredInstrument.model,
-            StoredInstrument.serial,
-            StoredInstrument.owner,
-            StoredInstrument.kind,
+            *(StoredResult.__table__.c[name] for name in _OWN),
+            *(StoredInstrument.__table__.c[name] for name in ("maker", "model", "serial", "owner", "kind")),
             Supersession.by_id,
         )
         .outerjoin(StoredInstrument, StoredInstrument.id == StoredResult.instrument_id)
@@ -145,13 +140,12 @@ def _row(row: Any, where: str) -> Listed:
         if row["serial"] is None
         else Item(row["maker"], row["model"], row["serial"], row["owner"], row["kind"])
     )
-    own = ("id", "command", "status", "message", "made", "measured", "operator", "version")
-    if any(row[key] is None for key in own):
+    if any(row[key] is None for key in _OWN):
         raise InputError(
             where,
             "a row of the results was damaged, expected one as it was written: see `inercal store check`",
         )
-    return Listed(**{key: row[key] for key in own}, instrument=item, superseded_by=row["by_id"])
+    return Listed(**{key: row[key] for key in _OWN}, instrument=item, superseded_by=row["by_id"])
 
 
 def numbers_of(store: Store, name: str) -> list[int]:
@@ -265,20 +259,8 @@ def values_of(store: Store, instrument: str) -> list[dict[str, Any]]:
     """All coefficients of an instrument's results that nothing supersedes, a row each, in the order of dates."""
     query = (
         select(
-            StoredResult.id,
-            StoredResult.command,
-            StoredResult.status,
-            StoredResult.made,
-            StoredResult.measured,
-            StoredCoefficient.position,
-            StoredCoefficient.name,
-            StoredCoefficient.value,
-            StoredCoefficient.u,
-            StoredCoefficient.expanded,
-            StoredCoefficient.k,
-            StoredCoefficient.dof,
-            StoredCoefficient.unit,
-            StoredCoefficient.common,
+            *(StoredResult.__table__.c[name] for name in ("id", "command", "status", "made", "measured")),
+            *(column for column in StoredCoefficient.__table__.c if column.name != "result_id"),
         )
         .join(StoredCoefficient, StoredCoefficient.result_id == StoredResult.id)
         .outerjoin(Supersession, Supersession.result_id == StoredResult.id)
@@ -287,3 +269,43 @@ def values_of(store: Store, instrument: str) -> list[dict[str, Any]]:
     with reading(store.engine, store.where) as connection:
         rows = [dict(row) for row in connection.execute(query).mappings()]
     return sorted(rows, key=lambda row: (row["measured"] or row["made"], row["id"], row["position"]))
+
+
+def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, str]:
+    """Say that a result takes the place of another, and why; both identities, whole.
+
+    Raises
+    ------
+    InputError
+        No such results, they are one and the same, of different instruments, the first is superseded already or would
+        supersede itself by way of others, or the reason is empty.
+    """
+    old, new, reason = find(store, identity), find(store, by), without_secrets(reason)
+    if not reason.strip():
+        raise InputError("--reason", "found an empty text, expected why the result is superseded")
+    if old == new:
+        raise InputError(by, "is the same result, expected the one that takes its place")
+    with writing(store.engine, store.where) as connection:
+        numbers = {
+            connection.execute(select(StoredResult.instrument_id).where(StoredResult.id == each)).scalar()
+            for each in (old, new)
+        }
+        if len(numbers) > 1:
+            raise InputError(by, f"is of another instrument than {old[:SHORT]}, expected one of the same")
+        after: dict[str, str] = {
+            row.result_id: row.by_id
+            for row in connection.execute(select(Supersession.result_id, Supersession.by_id))
+        }
+        if old in after:
+            raise InputError(
+                identity, f"is superseded by {after[old][:SHORT]} already, expected a result that is not"
+            )
+        last = new
+        while last in after:
+            last = after[last]
+        if last == old:
+            raise InputError(by, f"is superseded by {old[:SHORT]} itself, expected a result that is not")
+        row = {"result_id": old, "by_id": new, "reason": reason, "made": now()}
+        connection.execute(insert(Supersession).values(**row))
+        happened(connection, "supersede", old, digest_of(row))
+    return old, new

@@ -11,10 +11,7 @@ from sqlalchemy import Connection, select, text
 
 from inercal.foundation.errors import InputError
 from inercal.laboratory.catalog import SHORT
-from inercal.laboratory.database import reading
-from inercal.laboratory.keep import StoredRows, id_of
-from inercal.laboratory.store import BEGIN, Store, digest_of, hash_of, scrubbed, told
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     Certified,
     Event,
     IssuedCertificate,
@@ -26,7 +23,10 @@ from inercal.laboratory.tables import (
     StoredResult,
     Supersession,
     Used,
+    reading,
 )
+from inercal.laboratory.keep import StoredRows, id_of
+from inercal.laboratory.store import BEGIN, Store, digest_of, hash_of, scrubbed, told
 
 
 @dataclass(frozen=True)

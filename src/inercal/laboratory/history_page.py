@@ -20,8 +20,8 @@ from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import aligned, rounded
-from inercal.laboratory.chart import LIMIT, Mask
-from inercal.laboratory.history import HORIZON, REFERENCES, YEAR, Course, History
+from inercal.laboratory.history import REFERENCES, YEAR, Course, History, Mask
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import group_of
 from inercal.laboratory.wander import Interval
 
@@ -130,7 +130,7 @@ def rows(history: History) -> list[tuple[str, ...]]:
             if judged is None or wander is None
             else course.due.isoformat()
             if course.due
-            else f"> {HORIZON:.0f} years"
+            else f"> {LIMITS.horizon_years:.0f} years"
         )
         found.append(
             (course.name, str(k + 1), last, shown_U, *drift, *expected, course.unit, words, conform, due)
@@ -290,7 +290,7 @@ def _ewma(course: Course, first: float) -> list[Mark]:
 def _ewma_limits(course: Course) -> tuple[float, float]:
     """Limits of the axis of the EWMA: its own limits at least."""
     sizes = np.abs(course.chart.ewma)
-    far = 1.15 * max(LIMIT / 3.0, float(np.nanmax(sizes)) if np.isfinite(sizes).any() else 0.0)
+    far = 1.15 * max(LIMITS.chart_sigmas / 3.0, float(np.nanmax(sizes)) if np.isfinite(sizes).any() else 0.0)
     return -far, far
 
 

@@ -1,61 +1,86 @@
-"""Certificates that were issued: each number once, in the chain of events.
-
-A newer result takes the place of an older one by supersession.
-"""
+"""Certificates issued: written of results, each number once, in the chain of events."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from datetime import UTC, datetime
+from pathlib import Path
 
 from sqlalchemy import insert, select
 
-from inercal.foundation.addresses import without_secrets
+from inercal.foundation._files import input_bytes, write_bytes, write_text
 from inercal.foundation.errors import InputError
-from inercal.laboratory.catalog import SHORT, find
-from inercal.laboratory.database import writing
-from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import Certified, IssuedCertificate, StoredResult, Supersession
+from inercal.foundation.results.files import load
+from inercal.foundation.results.result import Estimate
+from inercal.laboratory.catalog import SHORT, find, show
+from inercal.laboratory.database import Certified, IssuedCertificate, Supersession, writing
+from inercal.laboratory.keep import item_of, keep, kept_already, saved_in
+from inercal.laboratory.store import VARIABLE, Store, digest_of, happened, now, open_store, place_of
 
 
-def supersede(store: Store, identity: str, by: str, reason: str) -> tuple[str, str]:
-    """Say that a result takes the place of another, and why; both identities, whole.
+def issue(
+    results: Sequence[str],
+    lab: Path,
+    number: str,
+    out: Path,
+    html: Path | None = None,
+    supersedes: str | None = None,
+    pages: Sequence[Path] = (),
+    store: str | None = None,
+) -> tuple[list[Estimate], str]:
+    """Write a certificate of results and its page, whole or not at all, and enter it into the store if there is one.
+
+    Parameters
+    ----------
+    results : sequence of str
+        Files, or results of the store by the beginning of their identity.
+    lab : Path
+        What the laboratory states.
+    number : str
+    out, html : Path
+        The certificate as XML, and as a page.
+    supersedes : str, optional
+        Number of the certificate that it replaces.
+    pages : sequence of Path
+        Reports of the first results, in their order.
+    store : str, optional
+        As of `inercal.laboratory.store.open_store`; the user's own only where it is there.
+
+    Returns
+    -------
+    list of Estimate
+        The results.
+    str
+        The store that it was entered into, empty for none.
 
     Raises
     ------
     InputError
-        No such results, they are one and the same, of different instruments, the first is superseded already or would
-        supersede itself by way of others, or the reason is empty.
+        A result, report or statement that cannot be used, or as `issuing`.
     """
-    old, new, reason = find(store, identity), find(store, by), without_secrets(reason)
-    if not reason.strip():
-        raise InputError("--reason", "found an empty text, expected why the result is superseded")
-    if old == new:
-        raise InputError(by, "is the same result, expected the one that takes its place")
-    with writing(store.engine, store.where) as connection:
-        numbers = {
-            connection.execute(select(StoredResult.instrument_id).where(StoredResult.id == each)).scalar()
-            for each in (old, new)
-        }
-        if len(numbers) > 1:
-            raise InputError(by, f"is of another instrument than {old[:SHORT]}, expected one of the same")
-        after: dict[str, str] = {
-            row.result_id: row.by_id
-            for row in connection.execute(select(Supersession.result_id, Supersession.by_id))
-        }
-        if old in after:
-            raise InputError(
-                identity, f"is superseded by {after[old][:SHORT]} already, expected a result that is not"
-            )
-        last = new
-        while last in after:
-            last = after[last]
-        if last == old:
-            raise InputError(by, f"is superseded by {old[:SHORT]} itself, expected a result that is not")
-        row = {"result_id": old, "by_id": new, "reason": reason, "made": now()}
-        connection.execute(insert(Supersession).values(**row))
-        happened(connection, "supersede", old, digest_of(row))
-    return old, new
+    from inercal.laboratory.certificate.lab import read_lab
+    from inercal.laboratory.certificate.page import page
+    from inercal.laboratory.certificate.reading import certificate_of
+    from inercal.laboratory.certificate.written import certificate
+
+    stated, opened = read_lab(lab), _store(store)
+    given: list[bytes | None] = [input_bytes(path, "a report") for path in pages]
+    given += [None] * (len(results) - len(given))
+    found = [_result(result, opened, report) for result, report in zip(results, given, strict=True)]
+    estimates, reports = [estimate for estimate, _ in found], [report for _, report in found]
+    made = certificate(estimates, stated, number, datetime.now(UTC).date(), reports, supersedes, lab)
+    readable = page(certificate_of(made, out))
+    entering: AbstractContextManager[None] = nullcontext()
+    if opened is not None:
+        kept = [_kept(opened, result, *one) for result, one in zip(results, found, strict=True)]
+        entering = issuing(opened, number, made, readable.encode(), kept, supersedes)
+    with entering:
+        write_bytes(out, made)
+        if html is not None:
+            write_text(html, readable)
+    return estimates, "" if opened is None else opened.where
 
 
 @contextmanager
@@ -122,3 +147,39 @@ def issuing(
         connection.execute(insert(Certified), [{"number": number, "result_id": each} for each in identities])
         happened(connection, "certificate", number, digest_of([row, identities]))
         yield
+
+
+def _store(given: str | None) -> Store | None:
+    """The store that is named, by option or environment, or the user's own where there is one."""
+    folder = place_of(given).folder
+    if (
+        given is None
+        and VARIABLE not in os.environ
+        and (folder is None or not (folder / "store.db").is_file())
+    ):
+        return None
+    return open_store(given)
+
+
+def _result(given: str, store: Store | None, report: bytes | None) -> tuple[Estimate, bytes | None]:
+    """A result of a file or of the store, and its report."""
+    if Path(given).is_file() or store is None:
+        return load(given), report
+    shown = show(store, given)
+    kept = None if shown.report is None else store.objects.read(shown.report)
+    return shown.estimate, kept if report is None else report
+
+
+def _kept(store: Store, given: str, estimate: Estimate, report: bytes | None) -> str:
+    """Identity of a result in the store, where it is kept first if it came as a file."""
+    if not Path(given).is_file():
+        return find(store, given)
+    saved, item = saved_in(Path(given), estimate), item_of(estimate)
+    known = kept_already(store, estimate, saved)
+    if known is None and item is None and estimate.names:
+        raise InputError(
+            given,
+            "found no instrument in it, expected [item] in its study, or that it is kept already, as by: inercal keep "
+            f'{given} --instrument "maker, model, serial"',
+        )
+    return keep(store, estimate, item, report, saved).id if known is None else known

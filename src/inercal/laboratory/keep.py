@@ -12,13 +12,12 @@ from typing import Any
 from sqlalchemy import Connection, insert, select
 
 from inercal.foundation.addresses import without_secrets
+from inercal.foundation.arrays import finite
 from inercal.foundation.errors import InputError
 from inercal.foundation.inputs import program
 from inercal.foundation.results.files import plain_objects, to_json
 from inercal.foundation.results.result import Estimate
-from inercal.laboratory.database import reading, writing
-from inercal.laboratory.store import Store, digest_of, happened, now
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
     SourceOf,
     StoredCoefficient,
     StoredFile,
@@ -26,10 +25,12 @@ from inercal.laboratory.tables import (
     StoredReference,
     StoredResult,
     Used,
+    numbered,
+    reading,
+    writing,
 )
-
-LARGE = 1 << 30
-"""Bytes beyond which a file is kept by reference: its path and SHA-256."""
+from inercal.laboratory.limits import LIMITS
+from inercal.laboratory.store import Store, digest_of, happened, now
 
 
 @dataclass(frozen=True)
@@ -150,7 +151,7 @@ def keep(
     with writing(store.engine, store.where) as connection:
         if connection.execute(select(StoredResult.id).where(StoredResult.id == identity)).first():
             return KeptResult(identity, False)
-        number = None if item is None else _instrument(connection, item)
+        number = None if item is None else numbered(connection, StoredInstrument, {**vars(item), "notes": ""})
         for file in files:
             if not connection.execute(select(StoredFile).where(StoredFile.sha256 == file["sha256"])).first():
                 connection.execute(insert(StoredFile).values(**file))
@@ -202,12 +203,12 @@ def coefficients_of(estimate: Estimate) -> tuple[dict[str, Any], ...]:
         {
             "name": plain_objects(p.name),
             **{
-                key: _finite(value)
+                key: finite(value)
                 for key, value in (("value", p.value), ("u", p.u), ("expanded", p.U), ("k", p.k))
             },
-            "dof": _finite(p.dof),
+            "dof": finite(p.dof),
             "unit": plain_objects(p.unit),
-            "common": None if common is None else _finite(math.sqrt(max(float(common[i]), 0.0))),
+            "common": None if common is None else finite(math.sqrt(max(float(common[i]), 0.0))),
         }
         for i, p in enumerate(estimate.parameters.values())
     )
@@ -226,11 +227,6 @@ def references_of(data: Mapping[str, Any]) -> tuple[dict[str, str], ...]:
     return tuple(dict(zip(keys, row, strict=True)) for row in sorted({tuple(row.values()) for row in rows}))
 
 
-def _finite(value: float) -> float | None:
-    """A finite number, else None."""
-    return value if math.isfinite(value) else None
-
-
 def add_rows(connection: Connection, rows: StoredRows, instrument_id: int | None) -> None:
     """Add the rows of a result, in a transaction that writes."""
     connection.execute(insert(StoredResult).values(**rows.result, instrument_id=instrument_id))
@@ -240,39 +236,11 @@ def add_rows(connection: Connection, rows: StoredRows, instrument_id: int | None
         for i, (sha256, path) in enumerate(rows.sources)
     ]
     coefficients = [{"result_id": identity, "position": i, **row} for i, row in enumerate(rows.coefficients)]
-    numbers = dict.fromkeys(_reference(connection, row) for row in rows.references)
+    numbers = dict.fromkeys(numbered(connection, StoredReference, row) for row in rows.references)
     used = [{"result_id": identity, "reference_id": number} for number in numbers]
     for table, values in ((SourceOf, sources), (StoredCoefficient, coefficients), (Used, used)):
         if values:
             connection.execute(insert(table), values)
-
-
-def _instrument(connection: Connection, item: Item) -> int:
-    """The primary key of an instrument; a new instrument is added."""
-    same = (
-        StoredInstrument.maker == item.maker,
-        StoredInstrument.model == item.model,
-        StoredInstrument.serial == item.serial,
-    )
-    number = connection.execute(select(StoredInstrument.id).where(*same)).scalar()
-    if number is None:
-        values = {"kind": item.kind, "owner": item.owner, "notes": ""}
-        row = {"maker": item.maker, "model": item.model, "serial": item.serial, **values}
-        number = connection.execute(
-            insert(StoredInstrument).values(**row).returning(StoredInstrument.id)
-        ).scalar_one()
-    return number
-
-
-def _reference(connection: Connection, row: Mapping[str, str]) -> int:
-    """The primary key of a reference; a new reference is added."""
-    same = (getattr(StoredReference, key) == row[key] for key in row)
-    number = connection.execute(select(StoredReference.id).where(*same)).scalar()
-    if number is None:
-        number = connection.execute(
-            insert(StoredReference).values(**row).returning(StoredReference.id)
-        ).scalar_one()
-    return number
 
 
 def _files(
@@ -285,7 +253,7 @@ def _files(
         place = without_secrets(source.path if "://" in source.path else str(path.absolute()))
         try:
             size = path.stat().st_size
-            if size > LARGE:
+            if size > LIMITS.whole_bytes:
                 rows.append({"sha256": source.sha256, "bytes": size, "place": place})
                 notes.append(f"{source.path}: {size / 2**30:.1f} GiB, kept by its path and checksum")
                 continue

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from inercal.foundation._files import is_pipe, replacing
+from inercal.foundation._files import is_pipe, make_folder, replacing
 from inercal.foundation.addresses import hidden_in
 from inercal.foundation.errors import InputError, MissingExtraError
 
@@ -94,10 +94,7 @@ class Objects:
                 raise InputError(self.place(sha256), f"cannot be written ({self._said(error)})") from error
             return
         target = Path(self.place(sha256))
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(target.parent, f"cannot be made ({error.strerror})") from error
+        make_folder(target.parent)
         with replacing(target) as file:
             file.writelines(pieces)
         with suppress(OSError):  # a file system without modes

@@ -19,11 +19,8 @@ from inercal.foundation.addresses import holds_secret, without_login, without_se
 from inercal.foundation.errors import InputError
 from inercal.foundation.results.files import plain_objects
 from inercal.laboratory.check import check, digests_of
-from inercal.laboratory.database import vacuum, writing
-from inercal.laboratory.migrations.append_only import suspended
-from inercal.laboratory.objects import Objects
-from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
-from inercal.laboratory.tables import (
+from inercal.laboratory.database import (
+    NAMES,
     Event,
     IssuedCertificate,
     Setting,
@@ -32,7 +29,12 @@ from inercal.laboratory.tables import (
     StoredResult,
     Tables,
     Used,
+    vacuum,
+    writing,
 )
+from inercal.laboratory.migrations.append_only import suspended
+from inercal.laboratory.objects import Objects
+from inercal.laboratory.store import BEGIN, SCRUB, Store, digest_of, happened, hash_of
 
 _APPEND_ONLY = (
     "recording",
@@ -159,8 +161,7 @@ def _certificate(content: bytes) -> bytes:
     """A certificate without secrets in its texts and in the files inside it."""
     from lxml import etree
 
-    from inercal.laboratory.certificate.elements import DCC
-    from inercal.laboratory.certificate.parsing import tree_of
+    from inercal.laboratory.certificate.elements import DCC, tree_of
 
     root, changed = tree_of(content, "certificate"), False
     for element in root.iter(f"{{{DCC}}}*"):
@@ -211,8 +212,8 @@ def _joined(connection: Connection, table: Table, row: Mapping[str, Any]) -> boo
     """True for a row of instruments or references that is there already without secrets; results point to it then."""
     if table.name not in _POINTERS:
         return False
-    pointer, names = _POINTERS[table.name]
-    same = [table.c[name] == row[name] for name in names]
+    pointer = _POINTERS[table.name]
+    same = [table.c[name] == row[name] for name in NAMES[table.name]]
     there = connection.execute(select(table.c.id).where(*same, table.c.id != row["id"])).scalar()
     if there is None:
         return False
@@ -224,11 +225,11 @@ def _joined(connection: Connection, table: Table, row: Mapping[str, Any]) -> boo
     return True
 
 
-_POINTERS: Mapping[str, tuple[Any, tuple[str, ...]]] = {
-    "instrument": (StoredResult.__table__.c.instrument_id, ("maker", "model", "serial")),
-    "reference": (Used.__table__.c.reference_id, ("name", "serial", "certificate", "valid_until")),
+_POINTERS: Mapping[str, Any] = {
+    "instrument": StoredResult.__table__.c.instrument_id,
+    "reference": Used.__table__.c.reference_id,
 }
-"""The column that points to rows of a table, and the columns by which these are told apart."""
+"""The column that points to rows of a table."""
 
 
 _KEYED = ("keep", "supersede", "certificate")

@@ -33,7 +33,7 @@ def group_of(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TypedLimits:
     """Limits of a coefficient as they were typed: (number, unit) of the lower and the upper one."""
 
     low: tuple[float, str]
@@ -44,7 +44,7 @@ class Limits:
 class Specification:
     """Limits by the name of a coefficient, or of a group such as ``K1``; the rule of decision, and its risk."""
 
-    limits: Mapping[str, Limits]
+    limits: Mapping[str, TypedLimits]
     rule: str
     risk: float | None
 
@@ -86,7 +86,7 @@ def specification_of(table: Mapping[str, Any], where: object) -> Specification:
     return Specification(limits, rule, risk)
 
 
-def _limits(value: Any, name: str, where: object) -> Limits:
+def _limits(value: Any, name: str, where: object) -> TypedLimits:
     """The limits of a coefficient."""
     key = f"specification.{name}"
     texts: Sequence[Any] = [value] if isinstance(value, str) else value
@@ -104,7 +104,7 @@ def _limits(value: Any, name: str, where: object) -> Limits:
         ends = [(-size, unit), (size, unit)]
     if ends[0][1] == ends[1][1] and not ends[0][0] < ends[1][0]:
         raise InputError(where, f"{key}: found {value!r}, expected the lower limit first")
-    return Limits(*ends)
+    return TypedLimits(*ends)
 
 
 def _typed(text: str, key: str, where: object) -> tuple[float, str]:

@@ -1,8 +1,7 @@
 """A store: made, opened, brought to the version of today.
 
-The place of a store: a folder with ``store.db`` and ``objects``, or the URL of a database.
-
-Events of a store: a chain of hashes, so that whoever changes a row later is found out.
+It lies in a folder with ``store.db`` and ``objects``, or in a database by its URL. Its events are a chain of hashes, so
+that whoever changes a row later is found out.
 """
 
 from __future__ import annotations
@@ -21,10 +20,13 @@ from typing import Any
 
 from sqlalchemy import Connection, Engine, func, insert, select
 
+from inercal.foundation._files import make_folder
 from inercal.foundation.addresses import holds_secret, shown_address
 from inercal.foundation.errors import InputError
 from inercal.laboratory.database import (
     VERSION,
+    Event,
+    Setting,
     check_version,
     engine_of,
     migrate,
@@ -33,7 +35,6 @@ from inercal.laboratory.database import (
     writing,
 )
 from inercal.laboratory.objects import Objects
-from inercal.laboratory.tables import Event, Setting
 
 BEGIN = "0" * 64
 """Hash before the first event."""
@@ -168,12 +169,10 @@ def make_store(given: str | None = None, objects: str | None = None) -> Store:
     if place.folder is None and objects is None:
         raise InputError("--objects", f"missing, expected the folder or URL for the objects of {place.shown}")
     if place.folder is not None:
+        make_folder(place.folder)
         try:
-            place.folder.mkdir(parents=True, exist_ok=True)
             with closing(sqlite3.connect(place.folder / "store.db")) as database:
                 database.execute("PRAGMA journal_mode=WAL")  # readers beside a writer
-        except OSError as error:
-            raise InputError(place.folder, f"cannot be made ({error.strerror})") from error
         except sqlite3.Error as error:
             raise InputError(place.folder, f"cannot hold a store ({error})") from error
     engine = engine_of(place.url, place.shown)

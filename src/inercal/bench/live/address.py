@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeVar
 from urllib.parse import parse_qsl, unquote
 
 from inercal.foundation.errors import InputError
@@ -121,6 +121,22 @@ class PieceFolder:
 
 Source = SerialPort | Udp | Tcp | Mqtt | Replay
 Sink = Text | PieceFolder | Udp | Mqtt
+
+
+A = TypeVar("A", bound=Source | Sink)
+
+
+def placed(address: A, read: Callable[[Path], Path], written: Callable[[Path], Path]) -> A:
+    """The address with its files where they lie: of those that are ``read``, and of the one that is ``written``."""
+    paths = {each.name: getattr(address, each.name) for each in fields(address)}
+    lies = written if isinstance(address, Text | PieceFolder) else read
+    moved: dict[str, Any] = {name: lies(path) for name, path in paths.items() if isinstance(path, Path)}
+    return replace(address, **moved)
+
+
+def target(sink: Sink) -> Path | None:
+    """The file or folder that a sink writes, None where it writes none."""
+    return sink.file if isinstance(sink, Text) else sink.folder if isinstance(sink, PieceFolder) else None
 
 
 def source_of(text: str) -> Source:

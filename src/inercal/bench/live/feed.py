@@ -15,7 +15,7 @@ from collections import deque
 from dataclasses import replace
 from typing import IO, TYPE_CHECKING
 
-from inercal.bench.live.intake import Arrival, Intake
+from inercal.bench.live.sources import Arrival, Intake
 from inercal.foundation.errors import MapError, RecordError
 from inercal.foundation.records.frames import CounterTurns, Frame, frames_in
 from inercal.foundation.records.places import counted_names, shortened

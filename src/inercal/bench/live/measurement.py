@@ -17,12 +17,11 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from inercal.bench.live.address import Sink, Source, sink_of, source_of
-from inercal.bench.live.counts import Counts, SinkCounts
+from inercal.bench.live.counts import Counts, SinkCounts, Watch, Watched, WatchedValue
 from inercal.bench.live.feed import Feed
-from inercal.bench.live.intake import Intake, is_datagrams, may_begin_within_a_row
 from inercal.bench.live.pieces import EstimatorRow, quantities_of
 from inercal.bench.live.sinks import Outlet, new_file
-from inercal.bench.live.watch import Watch, Watched, WatchedValue
+from inercal.bench.live.sources import Intake, is_datagrams, may_begin_within_a_row
 from inercal.faces.stream.lines import Lines
 from inercal.faces.stream.run import Output, Saving, run
 from inercal.foundation.errors import InercalError, InputError, RecordError

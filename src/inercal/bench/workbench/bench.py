@@ -17,7 +17,7 @@ import numpy as np
 from inercal.bench.workbench.jobs import Job, Queue
 from inercal.bench.workbench.measurements import MEASURED, Measurements
 from inercal.bench.workbench.sessions import MAP, PART, STUDY, Session, Sessions, put
-from inercal.faces.python.beginning import PLANNED
+from inercal.faces.python.study import PLANNED
 from inercal.foundation._files import read_bytes, write_text
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.errors import InercalError, InputError, plain, spelt
@@ -99,7 +99,7 @@ class Bench:
 
         Raises `InputError` where the recordings cannot be read or the kind is none.
         """
-        from inercal.faces.python.beginning import begun, kind_of_record
+        from inercal.faces.python.study import begun, kind_of_record
 
         plain("rate", rate or "")
         names = session.recordings
@@ -149,8 +149,7 @@ class Bench:
 
         Raises `InputError`.
         """
-        from inercal.faces.python.beginning import foresight, verticals
-        from inercal.faces.python.study import read_study
+        from inercal.faces.python.study import foresight, read_study, verticals
 
         if session.study is None:
             raise InputError(session.title, "found no study, expected one")

@@ -21,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from inercal.bench.workbench.sessions import is_numbered
 from inercal.foundation._files import is_pipe, read_bytes, write_text
 from inercal.foundation.addresses import shown_address
 from inercal.foundation.errors import InercalError, InputError, plain, spelt
@@ -154,7 +155,7 @@ class Queue:
         with self._changed:
             for before, word in pairwise(("the command", *arguments)):
                 plain(before if before.startswith("--") else "the command", word)
-            numbers = (int(each.name) for each in self.root.iterdir() if _is_number(each.name))
+            numbers = (int(each.name) for each in self.root.iterdir() if is_numbered(each.name))
             folder = self.folder_of(max(numbers, default=0) + 1)
             folder.mkdir()
             words = tuple(word.replace("{out}", os.path.relpath(folder, where)) for word in arguments)
@@ -316,11 +317,6 @@ def _ended(job: Job) -> Job:
     return replace(job, state=JobState.DONE if code in (0, 1) else JobState.REFUSED, code=code)
 
 
-def _is_number(name: str) -> bool:
-    """True for the name of a job's folder."""
-    return name.isascii() and name.isdigit()
-
-
 def _without_store(arguments: Iterable[str]) -> tuple[str, ...]:
     """Arguments without the store, which 0.2.0 put there and the environment holds now, and without other secrets."""
     kept, words = [], iter(arguments)
@@ -341,7 +337,7 @@ def _found(folder: Path) -> Job | None:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     sound = isinstance(arguments, list) and arguments and isinstance(code, int | None)
-    if not (sound and _is_number(folder.name) and all(isinstance(each, str) for each in texts)):
+    if not (sound and is_numbered(folder.name) and all(isinstance(each, str) for each in texts)):
         return None
     session, where, made, *words = map(spelt, texts)
     if not (kept := _without_store(words)):

@@ -1,7 +1,7 @@
 """Measurements of sessions: instruments by wire, measured in threads of this process, one at most for each session.
 
-They go on when a page is closed, and end with the workbench; what was recorded until then stays, in the folder ``live``
-of the session.
+They go on when a page is closed, and end with the workbench. Recordings stay, in the folder ``live`` of the session.
+The monitor of streams looks at each sample beside the estimator, and says whether the instrument is at rest.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ import shutil
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from inercal.bench.live.address import Mqtt, PieceFolder, Replay, Sink, Source, Text, sink_of, source_of
+from inercal.bench.live.address import Sink, placed, sink_of, source_of, target
 from inercal.bench.live.feed import frame_of
 from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement
-from inercal.bench.workbench.rest_detector import RestState
 from inercal.bench.workbench.sessions import MAP, STUDY, Session, Sessions, safe_name
 from inercal.foundation.errors import InercalError, InputError, plain
 from inercal.foundation.records.maps import read_map
@@ -27,6 +26,85 @@ from inercal.systems.listed import SYSTEMS
 
 if TYPE_CHECKING:
     from inercal.faces.stream.estimators import Make, Say, SayFinding
+    from inercal.faces.stream.lines import Lines, Sample
+    from inercal.faces.stream.monitor import Monitor
+    from inercal.faces.stream.run import Output, Recursive
+
+
+_LOOK = 0.2
+"""Time [s] between two rows of the monitor."""
+
+
+class RestState:
+    """Rest of the instrument as the monitor tells it, whatever is measured: ``at`` rest (None where it is not known),
+    and for how ``long`` [s]."""
+
+    def __init__(self) -> None:
+        self.at: bool | None = None
+        self.long = math.nan
+
+    def beside(self, make: Make) -> Make:
+        """The estimator, each sample of which the monitor looks at first; its rows are its own."""
+
+        def both(lines: Lines) -> Recursive[Any]:
+            from inercal.faces.stream.monitor import Monitor
+            from inercal.foundation.noise.running import load_kernels
+
+            inner = make(lines)
+            try:
+                monitor = Monitor(lines, _LOOK)
+            except InercalError:  # no sensor that it could look at
+                return inner
+            load_kernels()
+            return _WithMonitor(inner, monitor, self)
+
+        return both
+
+    def take(self, columns: Sequence[str], row: Output) -> None:
+        """Take a row of the monitor."""
+        at, long = (row[columns.index(name)] for name in ("rest", "still [s]"))
+        told = not isinstance(at, str) and math.isfinite(at)
+        self.at = bool(at) if told else None
+        self.long = math.nan if isinstance(long, str) else long
+
+
+class _WithMonitor:
+    """An estimator with a monitor beside it (`inercal.faces.stream.run.Recursive`)."""
+
+    def __init__(self, inner: Recursive[Any], monitor: Monitor, rest: RestState) -> None:
+        self.inner, self.kind, self.columns = inner, inner.kind, inner.columns
+        self._monitor: Monitor | None = monitor
+        self._state, self._rest = monitor.initial(), rest
+
+    @property
+    def settings(self) -> object:
+        """The settings of the estimator within."""
+        return self.inner.settings
+
+    @property
+    def failure(self) -> str:
+        """The failure of the estimator within, in words; empty without one."""
+        return str(getattr(self.inner, "failure", ""))
+
+    def initial(self) -> Any:
+        """The state before the first sample."""
+        return self.inner.initial()
+
+    def step(self, state: Any, sample: Sample) -> tuple[Any, Sequence[Output]]:
+        """The state after a sample, and its lines."""
+        if self._monitor is not None:
+            try:
+                self._state, rows = self._monitor.step(self._state, sample)
+            except InercalError:  # stamps that tell no time
+                self._monitor, rows = None, ()
+            for row in rows:
+                self._rest.take(self._monitor.columns if self._monitor else (), row)
+        return self.inner.step(state, sample)
+
+    def finish(self, state: Any) -> Sequence[Output]:
+        """The lines of rows that were held."""
+        return self.inner.finish(state)
+
 
 FOLDER = "live"
 """Folder of recordings and sinks in that of a session."""
@@ -157,11 +235,19 @@ def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
     study = read_study(session.kind, session.study)
     folder = session.folder / FOLDER
     typed = [sink_of(each) for each in wish.to]
-    source = _own_source(source_of(wish.source), session.folder)
-    sinks = [_own_sink(each, session.folder) for each in typed]
+    if "text:-" in map(str, typed):
+        raise InputError("to", "found text:-, expected a file, for a page has no standard output")
+
+    def read(path: Path) -> Path:
+        return _there(path, session.folder)
+
+    def written(path: Path) -> Path:
+        return folder / _plain(path)
+
+    source = placed(source_of(wish.source), read, written)
+    sinks = [placed(sink, read, written) for sink in typed]
     recording = folder / safe_name(wish.record) if wish.record else None
-    places = [recording, *(getattr(each, "file", None) or getattr(each, "folder", None) for each in sinks)]
-    names = [place for place in places if place is not None]
+    names = [place for place in (recording, *map(target, sinks)) if place is not None]
     if len(set(names)) < len(names) or len(set(map(str, sinks))) < len(sinks):
         raise InputError("to", "found one place for two things, expected a name for each")
     for place in names:
@@ -178,23 +264,6 @@ def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
     return WishedMeasurement(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
 
 
-def _own_source(source: Source, folder: Path) -> Source:
-    """The source with its files in the folder of the session; raises `InputError` for a file elsewhere."""
-    match source:
-        case Replay():
-            return replace(source, file=_there(source.file, folder))
-        case Mqtt():
-            return _own_broker(source, folder)
-        case _:
-            return source
-
-
-def _own_broker(broker: Mqtt, folder: Path) -> Mqtt:
-    """The topic with its files in the folder of the session."""
-    ca, login = (None if path is None else _there(path, folder) for path in (broker.ca, broker.login))
-    return replace(broker, ca=ca, login=login)
-
-
 def _there(path: Path, folder: Path) -> Path:
     """A file of the session, or of its folder ``live``; raises `InputError`."""
     name = path.name
@@ -203,21 +272,6 @@ def _there(path: Path, folder: Path) -> Path:
             if str(path) == typed and safe_name(name) == name and (place / name).is_file():
                 return place / name
     raise InputError(str(path), "is no file of this session, expected the name of one that was added to it")
-
-
-def _own_sink(sink: Sink, folder: Path) -> Sink:
-    """The sink with its file or folder in the folder ``live`` of the session; raises `InputError`."""
-    match sink:
-        case Text(file=None):
-            raise InputError("to", "found text:-, expected a file, for a page has no standard output")
-        case Text(file=Path() as file):
-            return Text(folder / FOLDER / _plain(file))
-        case PieceFolder():
-            return replace(sink, folder=folder / FOLDER / _plain(sink.folder))
-        case Mqtt():
-            return _own_broker(sink, folder)
-        case _:
-            return sink
 
 
 def _plain(path: Path) -> str:
@@ -233,7 +287,7 @@ def _command(session: Session, wish: Wish, sinks: Sequence[Sink], recording: Pat
     words += ["--map", MAP] if session.map is not None else []
     words += ["--record", f"{FOLDER}/{recording.name}"] if recording is not None else []
     for typed, sink in zip(wish.to, sinks, strict=True):
-        own = isinstance(sink, Text | PieceFolder)
+        own = target(sink) is not None
         words += ["--to", typed.replace(":", f":{FOLDER}/", 1) if own else typed]
     words += ["--every", f"{wish.every:g} s"] if wish.every else []
     return shlex.join(words)

@@ -17,7 +17,6 @@ from pydantic import BaseModel
 
 from inercal import __version__
 from inercal.bench.workbench.bench import Bench, said_of
-from inercal.bench.workbench.guard import REPORT_POLICY
 from inercal.bench.workbench.jobs import Job
 from inercal.bench.workbench.live_status import rows, status
 from inercal.bench.workbench.measurements import FOLDER, Wish, WishedMeasurement, interval_of, recordings
@@ -258,7 +257,13 @@ def rest_of(bench: Bench) -> FastAPI:
     return app
 
 
-_ALONE = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+_REPORT_POLICY = (
+    "sandbox allow-scripts allow-popups; default-src 'none'; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline'; img-src data:; font-src data:"
+)
+"""Of a report, which may hold names from a foreign file: alone in its frame, without any request."""
+
+_ALONE = {"content-security-policy": _REPORT_POLICY, "cache-control": "no-store"}
 """Headers of a file that may hold names from a foreign one: it asks for nothing, and nobody keeps it."""
 
 

@@ -117,7 +117,7 @@ class Sessions:
         if len(plain("title", title)) > _LONGEST_TITLE:
             raise InputError("title", f"found {len(title)} characters, expected {_LONGEST_TITLE} at most")
         self.root.mkdir(parents=True, exist_ok=True)
-        numbers = [int(folder.name) for folder in self.root.iterdir() if _is_number(folder.name)]
+        numbers = [int(folder.name) for folder in self.root.iterdir() if is_numbered(folder.name)]
         number = max(numbers, default=0)
         while True:  # another process may be taking the same number
             number += 1
@@ -162,8 +162,8 @@ class Sessions:
         write_text(session.folder / _ABOUT, json.dumps(about) + "\n")
 
 
-def _is_number(name: str) -> bool:
-    """True for the name of a session's folder."""
+def is_numbered(name: str) -> bool:
+    """True for the name of the folder of a session or a job."""
     return name.isascii() and name.isdigit()
 
 

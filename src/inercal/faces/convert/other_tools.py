@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inercal.faces.convert import imu_tk, imucal, kalibr, psins
 from inercal.faces.convert.convention import Convention, Units, flat, in_si_outputs, output_unit
 from inercal.faces.convert.correct import ImuModel, imu_model
-from inercal.foundation._files import read_bytes
+from inercal.foundation._files import input_text
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding, Status
@@ -145,7 +145,9 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
     nor given.
     """
     convention = CONVENTIONS[name]
-    terms, in_files = convention.parse([(path, _text(path, name)) for path in paths])
+    terms, in_files = convention.parse(
+        [(path, input_text(path, f"a calibration of {name}")) for path in paths]
+    )
     try:
         model = convention.model(terms, in_files)
     except InputError as error:
@@ -174,18 +176,6 @@ def from_tool(paths: Sequence[Path], name: str, units: Mapping[str, str] | None 
     )
     imu_model(estimate, paths[0])
     return estimate
-
-
-def _text(path: Path, name: str) -> str:
-    """The text of a file."""
-    try:
-        return read_bytes(path).decode()
-    except OSError as error:
-        raise InputError(
-            path, f"cannot be read ({error.strerror}), expected a calibration of {name}"
-        ) from error
-    except ValueError as error:
-        raise InputError(path, f"found no text in UTF-8, expected a calibration of {name}") from error
 
 
 def _outputs(units: Units, given: Mapping[str, str], has_gyro: bool, paths: Sequence[Path]) -> Units:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,11 +10,11 @@ from inercal.faces.python.result import Result, View, loaded
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
-from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.listed import SYSTEMS
 
 
-def of_comparison(estimate: Estimate, first: Estimate) -> Result:
+def _of_comparison(estimate: Estimate, first: Estimate) -> Result:
     """The comparison of a calibration with the ``first`` as a result, in the units in which that is shown."""
     from inercal.faces.report.comparison import page, picture, table
 
@@ -66,11 +67,16 @@ def compare(first: Result | Estimate | str | Path, second: Result | Estimate | s
     >>> ic.compare(found, found)["K1_x"].value
     0.0
     """
+    from inercal.foundation.records.read import source_of
     from inercal.foundation.results.compare import Saved
     from inercal.foundation.results.compare import compare as compared
 
-    files = [Saved(*estimate_of(each, where)) for each, where in ((first, "first"), (second, "second"))]
-    return of_comparison(compared(*files), files[0].estimate)
+    both = ((first, "first"), (second, "second"))
+    files = [Saved(*estimate_of(each, where)) for each, where in both]
+    inputs = tuple(source_of(each) for each, _ in both if isinstance(each, str | Path))
+    clock = time.perf_counter()
+    estimate = timed(compared(*files), clock)
+    return _of_comparison(replace(estimate, inputs=inputs or estimate.inputs), files[0].estimate)
 
 
 def apply(
@@ -152,7 +158,7 @@ def load(path: str | Path) -> Result:
     """
     estimate = read_estimate(path)
     if estimate.command == "compare":
-        return of_comparison(estimate, estimate)
+        return _of_comparison(estimate, estimate)
     of_command = (system.loaded for system in SYSTEMS.values() if system.command == estimate.command)
     return (next(of_command, None) or loaded)(estimate)
 

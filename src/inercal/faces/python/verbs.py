@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inercal.faces.python.calibrations import estimate_of
-from inercal.faces.python.result import Result
+from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Study, study, study_of
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.record import Record
-from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.system import SYSTEM as IMU
 from inercal.systems.listed import SYSTEMS
+
+if TYPE_CHECKING:
+    from inercal.faces.report.html import Picture
 
 
 def calibrate(
@@ -265,13 +271,15 @@ def _kinds_with(offer: str) -> str:
 
 
 def temperature(
-    given: Record | Sequence[Result | Estimate], at: str | float = 25.0, order: int | None = None
+    given: Record | Sequence[Result | Estimate | str | Path],
+    at: str | float = 25.0,
+    order: int | None = None,
 ) -> Result:
     """Fit what a sensor's output, or its calibration, does with temperature.
 
     Parameters
     ----------
-    given : Record or sequence of Result
+    given : Record or sequence of Result or path
         A recording at rest over a sweep of temperature, or calibrations made at several, in the order of time.
     at : str or float
         Temperature about which the polynomial is written: ``"25 degC"``, or degrees Celsius.
@@ -303,9 +311,74 @@ def temperature(
     if isinstance(given, Record):
         from inercal.systems.imu.temperature.sweep import fit_recording
 
-        return of_temperature(fit_recording(given, about, order))
-    from inercal.systems.imu.temperature.calibrations import fit_calibrations
+        clock = time.perf_counter()
+        model = fit_recording(given, about, order)
+    else:
+        from inercal.foundation.records.read import source_of
+        from inercal.systems.imu.temperature.calibrations import fit_calibrations
 
-    estimates = [estimate_of(each)[0] for each in given]
-    sources = [source for each in estimates for source in each.inputs[:1]]
-    return of_temperature(fit_calibrations(estimates, sources, about, order))
+        estimates = [estimate_of(each)[0] for each in given]
+        sources = [
+            source
+            for each, estimate in zip(given, estimates, strict=True)
+            for source in ([source_of(each)] if isinstance(each, str | Path) else estimate.inputs[:1])
+        ]
+        clock = time.perf_counter()
+        model = fit_calibrations(estimates, sources, about, order)
+    return of_temperature(replace(model, estimate=timed(model.estimate, clock)))
+
+
+def allan(record: Record) -> Result:
+    """Tell the noise of an instrument from a recording at rest.
+
+    Parameters
+    ----------
+    record : Record
+        At rest; ``record.between(...)`` takes a part of it.
+
+    Returns
+    -------
+    Result
+        N, B, K, R and Q of every channel that measures motion, with uncertainties; ``evidence.channels`` have the
+        Allan deviations.
+
+    Raises
+    ------
+    RecordError
+        No such channel, hardly any samples, or time stamps that do not increase.
+
+    Examples
+    --------
+    >>> import inercal as ic
+    >>> import numpy as np
+    >>> white = np.random.default_rng(1).standard_normal(6000) * 1e-3
+    >>> noise = ic.allan(ic.record(gyro_z=white, rate=100.0))
+    >>> round(noise["N_gyro_z"].value, 6), noise["N_gyro_z"].unit
+    (0.0001, 'rad/sqrt(s)')
+    """
+    from inercal.foundation.noise.outcome import noise_of
+
+    noise = noise_of(record)
+
+    def tables() -> list[str]:
+        from inercal.faces.report.allan import table
+
+        return [table(noise)]
+
+    def page() -> str:
+        from inercal.faces.report.allan import page as of_page
+
+        return of_page(noise)
+
+    def picture() -> Picture:
+        from inercal.faces.report.allan import pictures
+
+        return pictures(noise)[0]
+
+    estimate = noise.estimate
+    first = noise.channels[0]
+    seen = f"N_{first.name}"
+    words = f"{len(noise.channels)} channels"
+    if seen in estimate.names:
+        words += f", of the first {seen} = {estimate[seen].value:.3g} {estimate[seen].unit}"
+    return Result(estimate, View(estimate, words, tables, page, picture), noise)

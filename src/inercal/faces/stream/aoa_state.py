@@ -50,7 +50,7 @@ class Sensors:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Calibrations and columns, in the sense of `inercal.foundation.computing.checkpoint`."""
+        """Calibrations and columns, in the sense of `inercal.faces.stream.checkpoint`."""
         names = (*self._settings.layout.names, *GYROS)
         return {
             "sensors": repr([(name, self._settings.calibration(name)) for name in names]),

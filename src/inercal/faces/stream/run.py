@@ -34,9 +34,9 @@ from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.faces.stream.checkpoint import alone, fingerprint, load, save
 from inercal.faces.stream.doubt import Doubt, HeldRows
 from inercal.faces.stream.lines import Lines, Sample, StreamLine
-from inercal.foundation.computing.checkpoint import alone, fingerprint, load, save
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.foundation.records.places import counted
@@ -89,7 +89,7 @@ class Recursive(Protocol[S]):
     """An estimator that goes from sample to sample.
 
     ``kind`` names it, ``columns`` are the titles of its output lines, and ``settings`` is a state (in the sense
-    of `inercal.foundation.computing.checkpoint`) of all that, with the samples, decides its numbers.
+    of `inercal.faces.stream.checkpoint`) of all that, with the samples, decides its numbers.
     """
 
     @property

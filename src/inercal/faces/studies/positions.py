@@ -17,7 +17,7 @@ from inercal.faces.studies.rig import Angle, Limits
 from inercal.faces.studies.starting import POSITIONS
 from inercal.foundation._toml import Strict
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.candidates import within
+from inercal.foundation.designs.criteria import within
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.read import read
 from inercal.foundation.rigs.chain import Chain

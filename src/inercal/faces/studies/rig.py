@@ -27,7 +27,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.rotations import Axis, elementary
 from inercal.foundation.rigs.chain import Chain, Element, Error, Fixed, Joint, Scope
-from inercal.foundation.rigs.distribution import Distribution
+from inercal.foundation.rigs.patterns import Distribution
 from inercal.foundation.rigs.tables import TABLES, Slot, slots, turntable
 from inercal.foundation.units import Quantity, shown
 

@@ -20,8 +20,17 @@ from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.geometry.rotations import Axis
 from inercal.foundation.inputs import Source
 from inercal.foundation.rigs.chain import Element, Error, Scope
-from inercal.foundation.rigs.distribution import Distribution, normal, triangular, two_point, uniform
-from inercal.foundation.rigs.patterns import Harmonic, Known, Pattern, Tabulated
+from inercal.foundation.rigs.patterns import (
+    Distribution,
+    Harmonic,
+    Known,
+    Pattern,
+    Tabulated,
+    normal,
+    triangular,
+    two_point,
+    uniform,
+)
 from inercal.foundation.units import Quantity, parse_unit, shown
 
 ScopeName = Literal["sample", "position", "angle", "run", "rig"]

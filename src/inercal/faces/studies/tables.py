@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 from pydantic import Field, GetCoreSchemaHandler, create_model
 from pydantic_core import core_schema
 
-from inercal.faces.studies.fields import ExactText, QuantityText
+from inercal.faces.studies.fields import QuantityText
 from inercal.foundation._toml import Strict
 from inercal.foundation.keys import Key, keys_of
 from inercal.foundation.units import Quantity
@@ -84,9 +84,8 @@ def as_typed(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _quantity(key: Key) -> Any:
     """The type of a quantity, or of a list of them."""
-    text = ExactText if key.exact else QuantityText
     example = key.example[0] if isinstance(key.example, list) else key.example
-    one = Annotated[Quantity, text(key.dimension, str(example), key.bounds.accept, key.bounds.words)]
+    one = Annotated[Quantity, QuantityText(key.dimension, str(example), key.bounds.accept, key.bounds.words)]
     return list[one] if key.several else one
 
 

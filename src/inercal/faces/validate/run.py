@@ -16,7 +16,7 @@ from typing import Any, cast
 
 from inercal import __version__
 from inercal.examples import EXAMPLES, shipped
-from inercal.faces.validate import foundation, noise
+from inercal.faces.validate import foundation
 from inercal.faces.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
 from inercal.foundation._jit import source_hash
 from inercal.foundation.computing.executors import Executor, Processes, Serial
@@ -37,7 +37,7 @@ _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 
 def cases_of(system: str) -> Sequence[Case]:
     """The cases of a system, or of the floors below the systems."""
-    below = {"foundation": foundation.CASES, "noise": noise.CASES}
+    below = {"foundation": foundation.CASES, "noise": foundation.NOISE_CASES}
     return below[system] if system in below else listed.SYSTEMS[system].cases()
 
 

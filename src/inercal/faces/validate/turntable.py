@@ -9,13 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inercal.faces.validate.case import Case
-from inercal.faces.validate.gyrowheel import TABLE, one_turntable_calibration, settings_of
-from inercal.faces.validate.table import TABLE_CASES
+from inercal.faces.validate.table import TABLE, TABLE_CASES, one_turntable_calibration, settings_of
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.candidates import basis
-from inercal.foundation.designs.criteria import in_basis
-from inercal.foundation.rigs.distribution import uniform
+from inercal.foundation.designs.criteria import basis, in_basis
 from inercal.foundation.rigs.outputs import gravity_reference, table_outputs
+from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import averages, exact

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.computing.executors import Executor
-from inercal.foundation.designs.candidates import Candidates, Mask, require
-from inercal.foundation.designs.criteria import Criterion, covariance
+from inercal.foundation.designs.criteria import Candidates, Criterion, Mask, covariance, require
 from inercal.foundation.designs.search import from_starts
 from inercal.foundation.errors import InputError
 
@@ -71,7 +70,7 @@ def exchange(
         For the random starts; each has its own stream.
     starts : int
         Number of random starts. On a 10° grid one in five finds 12 positions for the nine functions of
-        `inercal.foundation.designs.candidates` with a D-efficiency of 0.995.
+        `inercal.foundation.designs.criteria` with a D-efficiency of 0.995.
     allowed : (m,) bool, optional
         Candidates that may be taken; all if absent.
     repeats : bool

@@ -20,22 +20,9 @@ from inercal.foundation.instruments.noise import SYMBOLS, allan_terms
 from inercal.foundation.noise.covariance import sums
 from inercal.foundation.noise.curve import AllanCurve, TermsFit
 from inercal.foundation.noise.deviation import AllanDeviation
-
-SPACING = 1.7
-"""Ratio, at least, of the averaging times that are fitted: those between tell nothing new."""
-
-FEWEST_TIMES = 3
+from inercal.foundation.noise.limits import LIMITS
 
 _N, _Q = SYMBOLS.index("N"), SYMBOLS.index("Q")
-
-SIGNIFICANT = 2.5
-"""A term is reported if a fit without it asks for it by that many standard deviations."""
-
-FEWEST_KEPT = 6
-"""Averaging times that are kept of those whose noise at short times is not of the kinds fitted."""
-
-MISFIT = 1e-3
-"""Probability of the sum of squared residuals below which the noise is not of the kinds fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +65,11 @@ def noise_coefficients(
     channel: int = 0,
     *,
     terms: tuple[str, ...] = SYMBOLS,
-    fit_range: tuple[float, float] | None = None,
 ) -> NoiseCoefficients:
     """Fit the noise of one channel and report the terms that it shows.
+
+    All averaging times are fitted; where the noise of short means is not of the kinds looked for (filters and dither
+    shape it), those from the shortest from which it is.
 
     Parameters
     ----------
@@ -90,39 +79,33 @@ def noise_coefficients(
         Column of it.
     terms : tuple of str, optional
         Terms looked for, of N, B, K, R, Q.
-    fit_range : (float, float), optional
-        Shortest and longest averaging time [s] to be fitted. By default all; where the noise of short means is not
-        of the kinds looked for (filters and dither shape it), from the shortest averaging time from which it is.
 
     Raises
     ------
     InputError
-        Fewer than `FEWEST_TIMES` averaging times apart by `SPACING` in the range stated, or unknown terms.
+        Unknown terms, or none.
 
     Notes
     -----
-    Terms are left out one at a time, the least significant first, while the least is below `SIGNIFICANT` standard
-    deviations under the noise of the others. What the reported squares would move by, were a term that was left out
-    fitted after all, is counted as one standard uncertainty. The degrees of freedom of a ramp are those of the noise
-    in which it is seen (Welch and Satterthwaite); those of other terms are half of the chi-square degrees of freedom
-    that a term's own scatter leaves it, for with a standard deviation s of nu degrees of freedom and
-    u = s/sqrt(2 nu) the interval s ± t(nu/2) u holds the truth at 95 % within 1 % from nu = 4 on, and more often
-    below. Where a misfit remains, the covariance is multiplied by chi2 per degree of freedom.
+    Terms are left out one at a time, the least significant first, while the least is below `Limits.term_sigmas`
+    standard deviations under the noise of the others. What the reported squares would move by, were a term that was
+    left out fitted after all, is counted as one standard uncertainty. The degrees of freedom of a ramp are those of the
+    noise in which it is seen (Welch and Satterthwaite); those of other terms are half of the chi-square degrees of
+    freedom that a term's own scatter leaves it, for with a standard deviation s of nu degrees of freedom and u =
+    s/sqrt(2 nu) the interval s ± t(nu/2) u holds the truth at 95 % within 1 % from nu = 4 on, and more often below.
+    Where a misfit remains, the covariance is multiplied by chi2 per degree of freedom.
     """
     unknown = [term for term in terms if term not in SYMBOLS]
     if unknown or not terms:
         expected = ", ".join(SYMBOLS)
         raise InputError("terms", f"found {', '.join(unknown) or 'none'}, expected some of {expected}")
     columns = [i for i, symbol in enumerate(SYMBOLS) if symbol in terms]
-    rows = _rows(deviation, channel, fit_range)
-    if len(rows) < FEWEST_TIMES:
-        if fit_range is not None:
-            raise InputError(
-                "fit_range",
-                f"found {len(rows)} averaging times to fit from {fit_range[0]:g} s to {fit_range[1]:g} s, expected "
-                f"at least {FEWEST_TIMES}, each {SPACING:g} times the one before",
-            )
-        few = f"there are fewer than {FEWEST_TIMES} averaging times with a deviation above zero: no noise was fitted"
+    rows = _rows(deviation, channel)
+    if len(rows) < LIMITS.fewest_times:
+        few = (
+            f"there are fewer than {LIMITS.fewest_times} averaging times with a deviation above zero: "
+            "no noise was fitted"
+        )
         return _nothing(deviation, terms, Finding("few_degrees_of_freedom", few))
     lengths = deviation.lengths[rows]
     scale = float(np.max(deviation.deviation[rows, channel]))
@@ -135,7 +118,7 @@ def noise_coefficients(
             deviation.samples, gain[:, _N], gain[:, _Q]
         ),
     )
-    tried = _tried(whole, columns, cut=fit_range is None)
+    tried = _tried(whole, columns)
     if not tried:
         line = "the output is a ramp without noise of the kinds looked for: none was fitted"
         return _nothing(deviation, terms, Finding("noise_misfit", line))
@@ -143,7 +126,7 @@ def noise_coefficients(
     fits = not _improbable(chi2, chi2_dof)
     if not fits:  # then the one that comes nearest
         curve, squares, chi2, chi2_dof = min(tried, key=lambda one: one[2] / max(one[3], 1))
-    fit = curve.fitted(curve.eliminated(squares, SIGNIFICANT))
+    fit = curve.fitted(curve.eliminated(squares, LIMITS.term_sigmas))
     first = len(rows) - len(curve.variances)
     span = (float(deviation.tau[rows[first]]), float(deviation.tau[rows[-1]]))
     inflation = 1.0 if fits else chi2 / chi2_dof
@@ -154,25 +137,24 @@ def noise_coefficients(
     return NoiseCoefficients(names, values, covariance, dof, bounds, span, chi2, chi2_dof, findings)
 
 
-def _rows(deviation: AllanDeviation, channel: int, fit_range: tuple[float, float] | None) -> list[int]:
-    """Averaging times to fit: known, within the range, and well apart."""
-    low, high = fit_range or (0.0, np.inf)
+def _rows(deviation: AllanDeviation, channel: int) -> list[int]:
+    """Averaging times to fit: known, and well apart."""
     rows: list[int] = []
     for row, (tau, value) in enumerate(zip(deviation.tau, deviation.deviation[:, channel], strict=True)):
-        apart = not rows or tau >= (SPACING - 1e-9) * deviation.tau[rows[-1]]
-        if value > 0.0 and apart and low * (1.0 - 1e-9) <= tau <= high * (1.0 + 1e-9):
+        apart = not rows or tau >= (LIMITS.spacing_ratio - 1e-9) * deviation.tau[rows[-1]]
+        if value > 0.0 and apart:
             rows.append(row)
     return rows
 
 
-def _tried(whole: AllanCurve, columns: list[int], cut: bool) -> list[tuple[AllanCurve, Array, float, int]]:
-    """Curves, from the whole to ever later starts if ``cut`` is allowed, with squares and misfit; the last may fit."""
+def _tried(whole: AllanCurve, columns: list[int]) -> list[tuple[AllanCurve, Array, float, int]]:
+    """Curves, from the whole to ever later starts, with squares and misfit; the last may fit."""
     tried = []
     curve, squares = whole, whole.squares(columns)
     while squares is not None:
         chi2, dof = curve.misfit(squares)
         tried.append((curve, squares, chi2, dof))
-        if not (cut and _improbable(chi2, dof)) or len(curve.variances) <= FEWEST_KEPT:
+        if not _improbable(chi2, dof) or len(curve.variances) <= LIMITS.fewest_kept:
             break
         curve = curve.without_first()
         squares = curve.squares(columns)
@@ -183,7 +165,7 @@ def _improbable(chi2: float, dof: int) -> bool:
     """True if the residuals are larger than chance lets them be."""
     from scipy.special import chdtrc
 
-    return dof > 0 and bool(chdtrc(dof, chi2) < MISFIT)
+    return dof > 0 and bool(chdtrc(dof, chi2) < LIMITS.misfit_chance)
 
 
 def _nothing(deviation: AllanDeviation, terms: tuple[str, ...], why: Finding) -> NoiseCoefficients:

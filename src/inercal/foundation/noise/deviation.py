@@ -12,15 +12,10 @@ from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.instruments.noise import SYMBOLS
 from inercal.foundation.noise.covariance import ALPHA, degrees_of_freedom, lag_one
 from inercal.foundation.noise.kernels import mean_square, mean_square_with_gaps
+from inercal.foundation.noise.limits import LIMITS
 
 Integers = NDArray[np.int64]
 Counts = NDArray[np.int32]
-
-PRESENT = 0.9
-"""Share of its samples that a mean needs."""
-
-FEWEST = 30
-"""Means by which the kind of noise can be told; at longer averaging times the last kind told is kept."""
 
 _WHITE_AND_STEPS = [SYMBOLS.index("N"), SYMBOLS.index("Q")]
 
@@ -82,17 +77,17 @@ def allan_deviation(
 
     Notes
     -----
-    A mean with missing samples is that of the samples there, if they are `PRESENT` of it at least: to ask for all of
-    them would leave nothing at long averaging times in a record that lost one sample in a thousand. White noise is
-    then overstated by the share that is missing, drift hardly. Quantisation is overstated by far more: the errors at
-    the ends of a gap within a mean no longer cancel, and add as white noise of 2 Q^2 a gap does. ``gain`` says by how
-    much, for the gaps that there are.
+    A mean with missing samples is that of the samples there, if they are `Limits.present_share` of it at least: to
+    ask for all of them would leave nothing at long averaging times in a record that lost one sample in a thousand.
+    White noise is then overstated by the share that is missing, drift hardly. Quantisation is overstated by far more:
+    the errors at the ends of a gap within a mean no longer cancel, and add as white noise of 2 Q^2 a gap does. ``gain``
+    says by how much, for the gaps that there are.
 
     The limits take the variance for chi-square with the equivalent degrees of freedom of one kind of noise (see
     `inercal.foundation.noise.covariance`): at each averaging time the kind whose differences of adjacent means have a
     lag 1 autocorrelation nearest to the one found, which is the method of Riley and Howe with the exact values for
     means (-2/3 quantisation, -1/2 white, -0.22 flicker, 1/4 random walk). The kinds come in this order as the averaging
-    time grows, and below `FEWEST` means the last one told is kept.
+    time grows, and below `Limits.kind_means` means the last one told is kept.
     Stable32 takes white samples for smoothed over a sample, and gives at one sample limits that are a twelfth closer.
 
     References
@@ -251,19 +246,19 @@ def _mean_square(
 
 def _least(m: int) -> int:
     """Samples that a mean over ``m`` needs."""
-    return int(np.ceil(PRESENT * m))
+    return int(np.ceil(LIMITS.present_share * m))
 
 
 def _exponent(sums: Array, present: Counts | None, m: int, last: int) -> int:
     """Kind of noise of means over ``m`` samples, as an exponent that is not above ``last``; that where they are few."""
     n = len(sums) - 1
-    if n // m < FEWEST:
+    if n // m < LIMITS.kind_means:
         return last
     at = np.arange(0, n - 3 * m + 1, max(1, m // 4, n // _MOST))
     first, second, third = (_means(sums, present, m, at + k * m) for k in range(3))
     before, after = second - first, third - second
     finite = np.isfinite(before) & np.isfinite(after)
-    if np.count_nonzero(finite) < FEWEST:
+    if np.count_nonzero(finite) < LIMITS.kind_means:
         return last
     before, after = (steps[finite] - steps[finite].mean() for steps in (before, after))  # without a ramp
     power = float(np.sum(before**2) + np.sum(after**2))

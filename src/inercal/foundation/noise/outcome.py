@@ -20,6 +20,7 @@ from inercal.foundation.instruments.noise import SYMBOLS
 from inercal.foundation.instruments.terms import noise_term
 from inercal.foundation.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.foundation.noise.deviation import AllanDeviation, allan_deviation, regular
+from inercal.foundation.noise.limits import LIMITS
 from inercal.foundation.records.column import Column, usable_interval
 from inercal.foundation.records.dwells import window_samples
 from inercal.foundation.records.places import counted
@@ -28,21 +29,6 @@ from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import RAW
-
-RESTLESS = 30.0
-"""Variance within a piece over that of calm pieces, from which it certainly is not noise alone."""
-
-JUMP = 7.0
-"""Difference of adjacent means in standard deviations (by the median), from which it certainly is not noise alone."""
-
-CALM = 0.05
-"""Share of the pieces, the calmest, that tells what noise alone looks like."""
-
-MOST = 0.25
-"""Share of restless pieces from which the channel counts as moving."""
-
-LARGEST = 30.0
-"""Factor on the Allan deviation by restless pieces from which the channel counts as moving."""
 
 _MEDIAN_OF_A_SQUARE = 0.455  # of a standard normal variable
 
@@ -65,7 +51,7 @@ class Unrest:
     @property
     def moving(self) -> bool:
         """True where the instrument moves, not only is knocked now and then."""
-        return self.pieces > MOST * self.of or not self.factor <= LARGEST
+        return self.pieces > LIMITS.moving_share * self.of or not self.factor <= LIMITS.moving_ratio
 
     @property
     def felt(self) -> bool:
@@ -105,11 +91,11 @@ def unrest(x: Array, interval: float) -> Unrest | None:
         return None
     moves = np.abs(np.diff(x))
     step = float(np.min(moves, initial=np.inf, where=moves > 0))
-    calm = max(float(np.quantile(variance[finite], CALM)), step**2 / 12.0)
-    restless = finite & (variance > RESTLESS * calm)
+    calm = max(float(np.quantile(variance[finite], LIMITS.calm_share)), step**2 / 12.0)
+    restless = finite & (variance > LIMITS.restless_ratio * calm)
     d, both = np.diff(mean) ** 2, finite[1:] & finite[:-1]
     usual = max(float(np.median(d[both])) / _MEDIAN_OF_A_SQUARE, calm / window) if both.any() else np.inf
-    jump = both & (d > JUMP**2 * usual)
+    jump = both & (d > LIMITS.jump_sigmas**2 * usual)
     restless[1:] |= jump
     restless[:-1] |= jump
     if not restless.any():
@@ -127,12 +113,6 @@ COMMAND = "allan"
 LEVEL = 0.683
 """Confidence of the limits of the curves."""
 
-FEWEST = 16
-"""Samples of a channel, below which there is no curve worth the name."""
-
-ENOUGH = 300
-"""Samples below which only white noise is looked for: in fewer, chance too often looks like the other kinds."""
-
 ONE_SIDED = 1.6449
 """Standard uncertainties to the one-sided 95 % limit of a normal distribution."""
 
@@ -147,9 +127,6 @@ REFERENCES = (
     "C. A. Greenhall, W. J. Riley, Uncertainty of stability variances based on finite differences, 35th PTTI (2003)",
     "IEEE Std 952, Specification format guide and test procedure for single-axis interferometric fiber optic gyros",
 )
-
-_IN_ORDER = 0.9
-"""Share of the rows whose time stamps go forward, from which the others are left out."""
 
 _CHANNELS = re.compile(r"acc_[xyz]|a[1-9]\d*|gyro(_[xyz]|_roll|_yaw)?|y_[xy]")
 _DIMENSIONS = ("acceleration", "rate", "number", *RAW)
@@ -248,16 +225,18 @@ def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
     # rows without a stamp, or with one that is not later than all before, are among the record's findings
     forward = np.isfinite(t) & (t > np.concatenate([[-np.inf], np.fmax.accumulate(t)[:-1]]))
     samples = np.stack([column.values * column.unit.factor for column in columns], axis=1)
-    if not forward.all() and np.mean(forward) > _IN_ORDER:
+    if not forward.all() and np.mean(forward) > LIMITS.in_order_share:
         t, samples = t[forward], samples[forward]
     samples[~np.isfinite(samples)] = np.nan
     size = float(np.nanmax(np.abs(samples), initial=0.0))
     if size > 1e100:
         raise RecordError(where, f"found values up to {size:.3g}, expected the output of a sensor")
     counts = np.isfinite(samples).sum(axis=0)
-    if counts.min() < FEWEST:
+    if counts.min() < LIMITS.fewest_samples:
         name = columns[int(np.argmin(counts))].name
-        raise RecordError(where, f"found {counts.min()} samples of {name}, expected at least {FEWEST}")
+        raise RecordError(
+            where, f"found {counts.min()} samples of {name}, expected at least {LIMITS.fewest_samples}"
+        )
     interval, samples = regular(t, samples, where)
     return usable_interval(interval, where), samples
 
@@ -267,7 +246,7 @@ def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, t
     if not np.nanmax(curve.deviation[:, at], initial=0.0) > 0:
         return None, (Finding("resolution", "the output never changes, there is no noise to be seen"),)
     whole = noise_coefficients(curve, at)
-    if curve.samples >= ENOUGH:
+    if curve.samples >= LIMITS.all_kinds_samples:
         return (whole if whole.names else None), whole.findings
     white = noise_coefficients(curve, at, terms=("N",))
     seen = {
@@ -276,7 +255,7 @@ def _fitted(curve: AllanDeviation, at: int) -> tuple[NoiseCoefficients | None, t
     bounds = {name: limit for name, limit in {**whole.bounds, **seen}.items() if name not in white.names}
     few = (
         f"{curve.samples} samples show white noise at most: of the others only limits are given, expected at least "
-        f"{ENOUGH} samples, and minutes of them"
+        f"{LIMITS.all_kinds_samples} samples, and minutes of them"
     )
     return replace(white, bounds=bounds), (*white.findings, Finding("few_degrees_of_freedom", few))
 

@@ -1,9 +1,8 @@
-"""Static intervals of a recording: where the instrument was held still.
+"""Static intervals of a recording, in which the instrument was held still.
 
-Windowed variance against a multiple of the variance of an initial static period (Tedaldi, Pretto,
-Menegatti, ICRA 2014, section IV-A).
-
-Stretches of a recording in which nothing moves, found coarsely: to look at, not to calibrate by.
+A calibration finds them by the variance in a window, against a multiple of that of an initial static period (Tedaldi,
+Pretto, Menegatti, ICRA 2014, section IV-A). `quiet` finds them coarsely, of any recording: to look at, not to calibrate
+by.
 """
 
 from __future__ import annotations
@@ -16,16 +15,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.column import Column, counted_rows
+from inercal.foundation.records.limits import LIMITS
 from inercal.foundation.records.record import Record
-
-_CALM = 4.0
-"""Variance of a window, over that of the calmest twentieth, up to which it is quiet."""
-
-_LIVELY = 20.0
-"""Variance of the liveliest twentieth over that of the calmest from which a recording has rests and turns."""
-
-_FEWEST = 20
-"""Windows of a recording whose rests are looked for."""
 
 
 def quiet(record: Record) -> tuple[tuple[float, float], ...]:
@@ -45,7 +36,9 @@ def quiet(record: Record) -> tuple[tuple[float, float], ...]:
     t = sensed[0].t
     size = window_samples((len(t) - 1) / float(t[-1] - t[0])) if len(t) > 1 and t[-1] > t[0] else len(t) + 1
     count = len(t) // size
-    if count < _FEWEST or any(each.t is not t and len(each.t) != len(t) for each in (*sensed, *joints)):
+    if count < LIMITS.fewest_windows or any(
+        each.t is not t and len(each.t) != len(t) for each in (*sensed, *joints)
+    ):
         return ()
     still = np.ones(count, dtype=bool)
     lively = False
@@ -55,15 +48,15 @@ def quiet(record: Record) -> tuple[tuple[float, float], ...]:
         if not len(known):
             continue
         calm, top = np.quantile(known, [0.05, 0.95])
-        lively = lively or top > _LIVELY * calm
-        still &= variance <= _CALM * max(float(calm), np.finfo(float).tiny)
+        lively = lively or top > LIMITS.lively_ratio * calm
+        still &= variance <= LIMITS.calm_ratio * max(float(calm), np.finfo(float).tiny)
     if not lively:
         return ()
     for each in joints:  # at a steady rate about the vertical no sensor changes
         variance = _variances(each, size, count)
         known = variance[np.isfinite(variance)]
         calm = float(np.quantile(known, 0.05)) if len(known) else 0.0
-        still &= variance <= max(_CALM * calm, 0.25 * _smallest_step(each) ** 2)
+        still &= variance <= max(LIMITS.calm_ratio * calm, 0.25 * _smallest_step(each) ** 2)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     return tuple(
         (float(t[begin * size]), float(t[min(end * size, len(t)) - 1]))

@@ -1,7 +1,7 @@
 """Time stamps that do not go on: which of them are wrong, told of a column at once or row by row, by one rule.
 
-A stamp goes on from the one before where its step is not above `_LEAP` times the usual one. One that does not is in
-doubt, with all that follow, until later ones decide:
+A stamp goes on from the one before where its step is not above `Limits.leap_steps` times the usual one. One that
+does not is in doubt, with all that follow, until later ones decide:
 
 - One goes on from the last that was sound, over all rows in doubt: those out of order are wrong. But where rows only
   came late, or changed places, there is no room for them between the two: they stay, for their order alone is wrong.
@@ -29,30 +29,10 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column
+from inercal.foundation.records.limits import LIMITS
 from inercal.foundation.records.places import counted, places
 
-_LEAP = 1.5
-"""Usual steps from which on rows are missing or a stamp is wrong; up to two steps ahead it would still be in order."""
-
-_KNOWN = 64
-"""Steps that tell the usual one, those of stamps that repeat aside."""
-
-_OFTEN = 3
-"""The usual step is the largest but two of these: gaps are rarer, and the first of rows in a burst are not."""
-
-_CHAIN = 3
-"""Stamps that go on from each other, which confirm a leap: two wrong digits in a row do not."""
-
-_MOST = 8
-"""Rows in doubt at most."""
-
-_FAR = 20.0
-"""Usual steps from which on the first or last stamp is far from all others."""
-
 _SAID = 3
-
-_JUDGED = 16
-"""Steps without which the last stamp is not judged."""
 
 
 class Order(NamedTuple):
@@ -72,12 +52,14 @@ class Order(NamedTuple):
                 return self, (True,)
             step = t - self.last
             if step >= 0.0 and self._is_usual(step):
-                return Order(t, (*self.steps[1 - _KNOWN :], step) if step else self.steps), (True,)
+                return Order(t, (*self.steps[1 - LIMITS.known_steps :], step) if step else self.steps), (
+                    True,
+                )
         held = (*self.held, t)
         goes_on = known and self._goes_on(held)
         sound = self._overtaken(held) if goes_on else self._confirmed(held) if known else None
         if sound is None:
-            if len(held) < _MOST:
+            if len(held) < LIMITS.doubtful_rows:
                 return self._replace(held=held), ()
             sound = [True] * len(held)
         stamps = [each for each, kept in zip(held, sound, strict=True) if kept and math.isfinite(each)]
@@ -85,7 +67,7 @@ class Order(NamedTuple):
             return Order(self.last, self.steps), sound
         steps = [later - before for before, later in itertools.pairwise([self.last, *stamps])]
         gained = (*self.steps, *(step for step in steps if step > 0.0))
-        return Order(max(stamps) if goes_on else stamps[-1], gained[-_KNOWN:]), sound
+        return Order(max(stamps) if goes_on else stamps[-1], gained[-LIMITS.known_steps :]), sound
 
     def end(self) -> Sequence[bool]:
         """For each row in doubt whether its stamp is sound, where none follows."""
@@ -97,48 +79,52 @@ class Order(NamedTuple):
             least = min(least, t) if t >= self.last else least
         sound.reverse()
         ahead = [t for t, each in zip(self.held, sound, strict=True) if each and math.isfinite(t)]
-        far = len(self.steps) >= _JUDGED and len(ahead) == 1 and ahead[0] - self.last > _FAR * self.usual
+        far = (
+            len(self.steps) >= LIMITS.last_steps
+            and len(ahead) == 1
+            and ahead[0] - self.last > LIMITS.far_steps * self.usual
+        )
         return [each and not (far and math.isfinite(t)) for t, each in zip(self.held, sound, strict=True)]
 
     @property
     def usual(self) -> float:
         """The usual step [s], above most that jitter makes."""
-        return sorted(self.steps)[-min(_OFTEN, len(self.steps))]
+        return sorted(self.steps)[-min(LIMITS.usual_rank, len(self.steps))]
 
     def _is_usual(self, step: float) -> bool:
         """True for a step [s] that is no leap; all are leaps before the first is known."""
-        left = min(_OFTEN, len(self.steps))
+        left = min(LIMITS.usual_rank, len(self.steps))
         for known in reversed(self.steps):  # most often the last ones tell
-            left -= step <= _LEAP * known
+            left -= step <= LIMITS.leap_steps * known
             if not left:
                 return True
         return False
 
     def _goes_on(self, held: Sequence[float]) -> bool:
         """True where the newest of the stamps in doubt goes on from before them all."""
-        return bool(self.steps) and 0.0 <= held[-1] - self.last <= _LEAP * self.usual * len(held)
+        return bool(self.steps) and 0.0 <= held[-1] - self.last <= LIMITS.leap_steps * self.usual * len(held)
 
     def _overtaken(self, held: Sequence[float]) -> list[bool]:
         """Verdicts on stamps, True for sound, the newest of which goes on from before them all."""
         between, rows = held[:-1], len(held)
         room = held[-1] - self.last >= (rows - 0.5) * sorted(self.steps)[len(self.steps) // 2]
-        reach = self.last + _LEAP * self.usual * rows
+        reach = self.last + LIMITS.leap_steps * self.usual * rows
         in_order = _ascending(self.last, between, held[-1])
         return [*(each or (not room and t <= reach) for each, t in zip(in_order, between, strict=True)), True]
 
     def _confirmed(self, held: Sequence[float]) -> list[bool] | None:
         """Verdicts on stamps, True for sound, the newest of which confirm each other; None where they do not."""
-        chain = [k for k, t in enumerate(held) if math.isfinite(t)][-_CHAIN:]
+        chain = [k for k, t in enumerate(held) if math.isfinite(t)][-LIMITS.chain_stamps :]
         steps = [held[b] - held[a] for a, b in itertools.pairwise(chain)]
-        if len(chain) < _CHAIN or min(steps) < 0.0:
+        if len(chain) < LIMITS.chain_stamps or min(steps) < 0.0:
             return None
-        alike = 0.0 < max(steps) <= _LEAP * min(steps)
+        alike = 0.0 < max(steps) <= LIMITS.leap_steps * min(steps)
         if not (alike or all(map(self._is_usual, steps))):
             return None
         first = chain[0]
         if self.last <= held[first]:
             in_order = _ascending(self.last, held[:first], held[first])
-            near = held[first] - _LEAP * max(steps) * len(held)  # as rows that only came late
+            near = held[first] - LIMITS.leap_steps * max(steps) * len(held)  # as rows that only came late
             late = [near <= t <= held[first] and t >= self.last for t in held[:first]]
             return [*map(operator.or_, in_order, late), *[True] * (len(held) - first)]
         # before a clock that was set, or at the beginning: sound is what leads up to it
@@ -146,7 +132,7 @@ class Order(NamedTuple):
         for k in (k for k in reversed(range(first)) if math.isfinite(held[k])):
             apart = held[after] - held[k]
             alone = k == 0 or math.isfinite(self.last)
-            sound[k] = apart >= 0.0 and not (alone and apart > _FAR * max(steps) * (after - k))
+            sound[k] = apart >= 0.0 and not (alone and apart > LIMITS.far_steps * max(steps) * (after - k))
             after = k if sound[k] else after
         return sound
 
@@ -188,10 +174,10 @@ def outlying(t: Array) -> NDArray[np.int64]:
         while ends[coming] < row:
             coming += 1
         first = ends[coming] - _LEAD
-        if order.steps and not order.held and first - _KNOWN > row:
+        if order.steps and not order.held and first - LIMITS.known_steps > row:
             steps = np.diff(t[max(first - _BEFORE, row) : first])
-            known = steps[steps > 0.0][-_KNOWN:]
-            if np.isfinite(steps).all() and len(known) == _KNOWN:
+            known = steps[steps > 0.0][-LIMITS.known_steps :]
+            if np.isfinite(steps).all() and len(known) == LIMITS.known_steps:
                 order, row = Order(float(t[first - 1]), tuple(known.tolist())), first
         order, sound = order.on(float(t[row]))
         row += 1

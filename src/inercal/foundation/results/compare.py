@@ -26,13 +26,11 @@ from inercal.foundation.records.places import counted_names
 from inercal.foundation.results.basis import Basis, Formula, provenance
 from inercal.foundation.results.budget import Uncertainty
 from inercal.foundation.results.common_sources import Taken, common_sources, other_instrument
+from inercal.foundation.results.limits import LIMITS
 from inercal.foundation.results.result import Estimate, Parameter
 from inercal.foundation.units import parse_unit
 
 COMMAND = "compare"
-
-FAMILY = 0.05
-"""Probability of the verdict "inconsistent" where nothing moved; half for each coefficient alone, half for all."""
 
 MODEL = Formula(
     r"$d$ = second - first; var($d$) = var(first) + var(second) less twice the covariance by common sources; "
@@ -43,9 +41,6 @@ REFERENCES = (
     "ISO 13528:2022, Statistical methods for use in proficiency testing by interlaboratory comparison",
     "JCGM 100:2008, Guide to the expression of uncertainty in measurement",
 )
-
-_SMALL = 0.02
-"""Share of a source in the variance of any coefficient, up to which it matters little whether it is common."""
 
 _SINGULAR = 1e-12
 """Eigenvalue of the correlation matrix, per coefficient, below which a combination has no uncertainty."""
@@ -131,7 +126,7 @@ def compare(first: Saved, second: Saved) -> Estimate:
             "common_sources": list(common),
             "only_in_first": [name for name in first.estimate.names if name not in names],
             "only_in_second": [name for name in second.estimate.names if name not in names],
-            "family_wise_probability": FAMILY,
+            "family_wise_probability": LIMITS.moved_risk,
         },
     )
 
@@ -221,7 +216,7 @@ def _row(
         "z": z,
         "normalised_error": abs(z) / p.k,
         "probability": probability,
-        "moved": probability * coefficients < FAMILY / 2.0,
+        "moved": probability * coefficients < LIMITS.moved_risk / 2.0,
         "common": [source for source, (by_a, _) in common.items() if by_a[i] != 0.0],
     }
 
@@ -277,7 +272,7 @@ def _verdict(rows: list[dict[str, Any]], joint: _Joint, names: list[str]) -> tup
             f"{shown}{more} moved by more than the uncertainties explain (all {len(names)} together: probability "
             f"{joint.probability:.2g})"
         )
-    if joint.probability < FAMILY / 2.0:
+    if joint.probability < LIMITS.moved_risk / 2.0:
         return Status.INCONSISTENT, (
             f"together the {len(names)} differences are larger than their covariance explains (probability "
             f"{joint.probability:.2g}), most in the combination {in_words(joint.direction, names)}, though none is "
@@ -351,7 +346,7 @@ def _findings(first: Saved, second: Saved, common: Mapping[str, tuple[Array, Arr
         for item in a.budget
         if item.type == "B"
         and item.source not in common
-        and max(item.share.values(), default=0.0) > _SMALL
+        and max(item.share.values(), default=0.0) > LIMITS.common_share
         and any((item.source, item.u) == (other.source, other.u) for other in b.budget)
     ]
     if constant:

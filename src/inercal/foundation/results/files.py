@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from inercal.foundation._files import read_bytes, write_text
+from inercal.foundation._files import input_bytes, write_text
 from inercal.foundation.addresses import without_secrets
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
@@ -151,16 +151,10 @@ def save(estimate: Estimate, path: str | Path) -> None:
 
 def load(path: str | Path) -> Estimate:
     """Read an estimate that `save` wrote; raises `InputError` in one sentence."""
-    try:
-        data = read_bytes(path)
-    except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror}), {_EXPECTED}") from error
-    except ValueError as error:  # a NUL in the path
-        raise InputError(repr(str(path)), f"{error}, {_EXPECTED}") from error
-    return parse(data, path)
+    return parse(input_bytes(path, _EXPECTED), path)
 
 
-_EXPECTED = "expected a calibration written by inercal (.json or .toml)"
+_EXPECTED = "a calibration written by inercal (.json or .toml)"
 
 
 def parse(content: bytes, path: str | Path) -> Estimate:
@@ -168,7 +162,7 @@ def parse(content: bytes, path: str | Path) -> Estimate:
     try:
         text = content.decode()
     except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start} is not UTF-8 text, {_EXPECTED}") from error
+        raise InputError(path, f"byte {error.start} is not UTF-8 text, expected {_EXPECTED}") from error
     try:
         if Path(path).suffix.lower() == ".toml":
             import tomllib
@@ -177,17 +171,17 @@ def parse(content: bytes, path: str | Path) -> Estimate:
         else:
             data = json.loads(text)
         if not isinstance(data, Mapping):
-            raise InputError(path, f"holds {shown(text.strip())}, {_EXPECTED}")
+            raise InputError(path, f"holds {shown(text.strip())}, expected {_EXPECTED}")
         return from_json(data)
     except KeyError as error:
         hint = "; `inercal convert --from` reads those of other tools"
-        raise InputError(path, f"the key {error} is missing, {_EXPECTED}{hint}") from error
+        raise InputError(path, f"the key {error} is missing, expected {_EXPECTED}{hint}") from error
     except json.JSONDecodeError as error:
-        raise InputError(path, f"not valid JSON: {error}, {_EXPECTED}") from error
+        raise InputError(path, f"not valid JSON: {error}, expected {_EXPECTED}") from error
     except (TypeError, AttributeError) as error:
-        raise InputError(path, f"does not have the form of one, {_EXPECTED}") from error
+        raise InputError(path, f"does not have the form of one, expected {_EXPECTED}") from error
     except (ValueError, OverflowError, RecursionError) as error:
-        raise InputError(path, f"{str(error)[:120]}, {_EXPECTED}") from error
+        raise InputError(path, f"{str(error)[:120]}, expected {_EXPECTED}") from error
 
 
 def _toml(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:

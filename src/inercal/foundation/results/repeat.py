@@ -27,17 +27,9 @@ from inercal.foundation.records.places import counted
 from inercal.foundation.results.basis import Basis
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.files import plain_objects
+from inercal.foundation.results.limits import LIMITS
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import rounded
-
-SIGNIFICANCE = 1e-3
-"""Probability, over all coefficients, below which chance is ruled out as the cause of differences between runs."""
-
-OF_ANOTHER_SCALE = 2e-3
-"""Relative standard deviation of scale factors between runs beyond that of one instrument."""
-
-OF_ANOTHER_ANGLE = 1e-3
-"""Standard deviation of misalignments [rad] between runs beyond that of one instrument."""
 
 REFERENCE = (
     "J. Mandel, R. C. Paule, Interlaboratory evaluation of a material with unequal numbers of replicates, Analytical "
@@ -196,7 +188,7 @@ def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
     """``between_runs``: coefficients that change from run to run beyond chance."""
     findings = []
     for name, part in zip(first.names, parts, strict=True):
-        if part.probability < SIGNIFICANCE / len(parts):
+        if part.probability < LIMITS.repeat_chance / len(parts):
             size = np.sqrt(part.between)
             text = f"{name} changes from run to run, standard deviation {rounded(size, size)[0]} {first[name].unit}"
             findings.append(Finding("between_runs", text))
@@ -206,15 +198,15 @@ def _changes(first: Estimate, parts: Sequence[Combined]) -> list[Finding]:
 def _of_several(names: Sequence[str], x: Array, parts: Sequence[Combined]) -> list[Finding]:
     """``several_instruments``: runs (k, p) that change in scale and misalignment at once, as no instrument does.
 
-    At least half of the scale factors change beyond chance by more than `OF_ANOTHER_SCALE`, and half of the
-    misalignments by more than `OF_ANOTHER_ANGLE`.
+    At least half of the scale factors change beyond chance by more than `Limits.same_scale`, and half of the
+    misalignments by more than `Limits.same_angle`.
     """
-    ruled_out = np.array([part.probability < SIGNIFICANCE / len(parts) for part in parts])
+    ruled_out = np.array([part.probability < LIMITS.repeat_chance / len(parts) for part in parts])
     size = np.sqrt([part.between for part in parts])
     scale = np.array([name.startswith(("K1_", "S_")) for name in names])
     angle = np.array([name.startswith(("M_", "T_")) for name in names])
-    other_scale = ruled_out & scale & (size > OF_ANOTHER_SCALE * np.abs(np.mean(x, axis=0)))
-    other_angle = ruled_out & angle & (size > OF_ANOTHER_ANGLE)
+    other_scale = ruled_out & scale & (size > LIMITS.same_scale * np.abs(np.mean(x, axis=0)))
+    other_angle = ruled_out & angle & (size > LIMITS.same_angle)
     if not scale.any() or 2 * other_scale.sum() < scale.sum() or 2 * other_angle.sum() < angle.sum():
         return []
     text = (

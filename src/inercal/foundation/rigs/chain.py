@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import Axis, elementary, skew
 from inercal.foundation.inputs import Source
-from inercal.foundation.rigs.distribution import Distribution
-from inercal.foundation.rigs.patterns import Known, Numbers, Pattern, commanded
+from inercal.foundation.rigs.patterns import Distribution, Known, Numbers, Pattern, commanded
 
 
 class Scope(enum.Enum):

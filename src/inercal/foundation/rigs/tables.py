@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import Axis, elementary
 from inercal.foundation.rigs.chain import Chain, Element, Error, Fixed, Joint, Scope
-from inercal.foundation.rigs.distribution import Distribution
+from inercal.foundation.rigs.patterns import Distribution
 
 
 @dataclass(frozen=True)

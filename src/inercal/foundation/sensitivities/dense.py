@@ -24,9 +24,8 @@ from inercal.foundation.geometry.rotations import elementary, skew
 from inercal.foundation.rigs.chain import Chain, Error, Fixed, Joint
 from inercal.foundation.rigs.outputs import Output
 from inercal.foundation.rigs.patterns import Known
-from inercal.foundation.sensitivities.exact import drop_rounding, positions
+from inercal.foundation.sensitivities.exact import drop_rounding, moments, positions
 from inercal.foundation.sensitivities.indices import Indices, VarianceParts, shapley_effects
-from inercal.foundation.sensitivities.moments import moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +285,7 @@ def _diagonal(parts: Sequence[Array]) -> Array:
 
 
 def _random_rotation(error: Error, factor: int, degrees: Sequence[int]) -> Random:
-    """Blocks of a random rotation, from the functions s, e, s e, e^2 of `inercal.foundation.sensitivities.moments`.
+    """Blocks of a random rotation, from the functions s, e, s e, e^2 of `inercal.foundation.sensitivities.exact`.
 
     R = I + s K - e C, and with s^2 = 2 e - e^2
     R x R = I + s (K x I + I x K) + e (2 K x K - C x I - I x C) - s e (K x C + C x K) + e^2 (C x C - K x K).

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from inercal.foundation.arrays import Array
 from inercal.foundation.computing.executors import Executor, numbered
 from inercal.foundation.rigs.chain import Chain
-from inercal.foundation.rigs.distribution import Distribution
 from inercal.foundation.rigs.outputs import Output
+from inercal.foundation.rigs.patterns import Distribution
 from inercal.foundation.sensitivities.indices import Indices, Resampled
 
 Sampling: TypeAlias = Literal["random", "sobol"]

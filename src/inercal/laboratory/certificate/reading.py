@@ -17,14 +17,13 @@ from scipy.optimize import brentq
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Status
-from inercal.foundation.instruments.dsi import as_written, from_dsi
-from inercal.foundation.instruments.reference_types import PREFIX
+from inercal.foundation.instruments.dsi import PREFIX, as_written, from_dsi
 from inercal.foundation.results.files import parse
 from inercal.foundation.results.result import COVERAGE, Estimate, coverage_factor
 from inercal.foundation.units import shown
-from inercal.laboratory.certificate.elements import DCC, NAMESPACES
-from inercal.laboratory.certificate.parsing import parsed, tree_of
+from inercal.laboratory.certificate.elements import DCC, NAMESPACES, parsed, tree_of
 from inercal.laboratory.certificate.schema import VERSION, fault
+from inercal.laboratory.limits import LIMITS
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -345,11 +344,7 @@ def _dof(k: float, probability: float) -> float:
     p = probability if 0.0 < probability < 1.0 else COVERAGE
     if k == 2.0 or k <= coverage_factor(math.inf, p) * (1.0 + 1e-9):
         return math.inf
-    if k >= coverage_factor(_FEWEST, p):
-        return _FEWEST
-    inverse = brentq(lambda x: coverage_factor(1.0 / x, p) - k, 1e-9, 1.0 / _FEWEST)
+    if k >= coverage_factor(LIMITS.fewest_dof, p):
+        return LIMITS.fewest_dof
+    inverse = brentq(lambda x: coverage_factor(1.0 / x, p) - k, 1e-9, 1.0 / LIMITS.fewest_dof)
     return 1.0 / float(inverse)
-
-
-_FEWEST = 0.1
-"""Degrees of freedom that are read from a factor at least."""

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inercal import __version__
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.instruments.dsi import as_written, dsi, from_dsi, is_coherent
-from inercal.foundation.instruments.reference_types import PREFIX, reference_type
+from inercal.foundation.instruments.dsi import PREFIX, as_written, dsi, from_dsi, is_coherent, reference_type
 from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.files import to_json
 from inercal.foundation.results.result import COVERAGE, Estimate, coverage_factor
-from inercal.laboratory.certificate.administration import software
 from inercal.laboratory.certificate.elements import (
     dcc,
     factor,
@@ -162,6 +161,11 @@ def _refuse_unknown(estimate: Estimate) -> None:
 def _result(name: str, ref_type: str, parts: Iterable[_Element]) -> _Element:
     """The element ``result`` with its data."""
     return dcc("result", words("name", name), dcc("data", *parts), ref_type=ref_type)
+
+
+def software() -> _Element:
+    """The element of the software: this program."""
+    return dcc("software", words("name", "inercal"), dcc("release", __version__), dcc("type", "application"))
 
 
 def _methods(estimate: Estimate) -> _Element:

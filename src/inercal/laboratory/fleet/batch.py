@@ -1,13 +1,13 @@
-"""All units of a manifest calibrated: on many processors, going on where an earlier run stopped.
+"""All units of a manifest calibrated, on many processors, from where an earlier run stopped.
 
-The table of a fleet as files: a row for each unit, in CSV and Parquet.
+The outcome is a folder: a table with a row for each unit in CSV and Parquet, a page, a result, and the result of each
+unit.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import closing
@@ -17,8 +17,9 @@ from typing import Any
 
 from inercal.faces.python.result import Result, View
 from inercal.faces.python.study import Study, kind_of, read_study
-from inercal.foundation._files import replacing, write_text
+from inercal.foundation._files import make_folder, replacing, write_text
 from inercal.foundation.addresses import holds_secret
+from inercal.foundation.arrays import finite
 from inercal.foundation.computing.cluster import LOCAL, ChunkLostError, Cluster, place
 from inercal.foundation.computing.executors import Executor, Processes
 from inercal.foundation.errors import InputError, MissingExtraError
@@ -52,18 +53,13 @@ def columns(rows: Sequence[UnitRow]) -> dict[str, list[Any]]:
     for name, unit in units.items():
         these = [c.get(name) for c in own]
         same = [each if each is not None and each.unit == unit else None for each in these]
-        found[f"{name} [{unit}]"] = [None if each is None else _finite(each.value) for each in same]
-        found[f"U_{name} [{unit}]"] = [None if each is None else _finite(each.U) for each in same]
+        found[f"{name} [{unit}]"] = [None if each is None else finite(each.value) for each in same]
+        found[f"U_{name} [{unit}]"] = [None if each is None else finite(each.U) for each in same]
     found["measured"] = [row.measured for row in rows]
     found["made"] = [row.made for row in rows]
     found["seconds [s]"] = [row.seconds for row in rows]
     found["inputs"] = [" ".join(row.inputs.values()) for row in rows]
     return found
-
-
-def _finite(value: float) -> float | None:
-    """A finite number, else None."""
-    return value if math.isfinite(value) else None
 
 
 def as_csv(rows: Sequence[UnitRow]) -> str:
@@ -175,7 +171,7 @@ def batch(
     specification = specification_of(the_study.keys.get("specification", {}), study)
     _spare(folder, manifest, units, [*maps, *the_study.files])
     for each in (folder, folder / "units", folder / "results"):
-        _make(each)
+        make_folder(each)
     work = Batch(manifest, content_of(units), study, maps[0] if maps else None, folder, overrides, store)
     work.prepare()
     rows = _rows(work, units, executor, workers, progress)
@@ -208,16 +204,6 @@ def _spare(folder: Path, manifest: Path, units: Sequence[FleetUnit], others: Ite
     for target in (folder / name for name in _NAMES):
         if realpath(target) in inputs:
             raise InputError(target, "is an input, expected another folder for the outcome")
-
-
-def _make(folder: Path) -> None:
-    """Make a folder; raises `InputError`."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            folder, f"cannot be made ({error.strerror}), expected a folder that can be written"
-        ) from error
 
 
 def _rows(

@@ -1,12 +1,10 @@
 """A fleet as a whole: yield, capability, trends, and the units to look at first.
 
-Units that are unlike the others: robust distance in the space of all coefficients.
-
-Middle and scatter of the fleet are those of its three quarters that lie closest together (minimum covariance
-determinant, found by the steps of Rousseeuw and Van Driessen 1999 from two starts of Hubert, Rousseeuw and Verdonck
-2012), so that a quarter of strange units does not move them. Where there are few units for the number of coefficients,
-the distance is that of the coefficient that is farthest off, in robust standard deviations. How far a sound unit may
-lie is found by simulated fleets of the same size.
+A unit is strange by its robust distance in the space of all coefficients. Middle and scatter of the fleet are those of
+its three quarters that lie closest together (minimum covariance determinant, found by the steps of Rousseeuw and Van
+Driessen 1999 from two starts of Hubert, Rousseeuw and Verdonck 2012), so that a quarter of strange units does not move
+them. Where there are few units for the number of coefficients, the distance is that of the coefficient that is farthest
+off, in robust standard deviations. The largest distance of a sound unit is found by simulated fleets of the same size.
 """
 
 from __future__ import annotations
@@ -21,18 +19,129 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.laboratory.fleet.capability import Share, Spread, spreads
 from inercal.laboratory.fleet.unit import FAILED, REFUSED, UnitRow
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import Specification
 
-RISK = 0.05
-"""Probability that a sound fleet has any unit named."""
 
-FEWEST = 10
-"""Units below which none can be told to be strange."""
+@dataclass(frozen=True)
+class Share:
+    """A share of ``good`` units among ``all``, with its interval (Clopper and Pearson 1934)."""
 
-_CORE = 0.75
-"""Share of the units that the scatter is of."""
+    good: int
+    all: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the interval of `Limits.interval_level`."""
+        from scipy.special import betaincinv
+
+        tail = 0.5 * (1.0 - LIMITS.interval_level)
+        k, n = self.good, self.all
+        low = 0.0 if k == 0 else float(betaincinv(k, n - k + 1, tail))
+        high = 1.0 if k == n else float(betaincinv(k + 1, n - k, 1.0 - tail))
+        return low, high
+
+
+@dataclass(frozen=True)
+class Index:
+    """An index of capability with the ends of its interval of `Limits.interval_level`."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A coefficient over the fleet, in ``unit``: values (n,) of the units that have one, their places in the fleet.
+
+    ``mean``, ``scatter`` (standard deviation), ``u`` (root mean square of the standard uncertainties), ``limits``
+    where the study states some, and the places of the units that do ``not_conform``.
+    """
+
+    name: str
+    unit: str
+    places: tuple[int, ...]
+    values: Array
+    u: float
+    limits: tuple[float, float] | None
+    not_conform: tuple[int, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean of the values."""
+        return float(self.values.mean())
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the values, NaN of one."""
+        return float(self.values.std(ddof=1)) if len(self.values) > 1 else math.nan
+
+    @property
+    def Cp(self) -> Index | None:
+        """Width of the limits over six standard deviations, its interval by chi-square (ISO 22514-2)."""
+        from scipy.special import chdtri
+
+        if self.limits is None or not self.scatter > 0.0:
+            return None
+        value = (self.limits[1] - self.limits[0]) / (6.0 * self.scatter)
+        dof, tail = len(self.values) - 1, 0.5 * (1.0 - LIMITS.interval_level)
+        low, high = (math.sqrt(float(chdtri(dof, upper)) / dof) for upper in (1.0 - tail, tail))
+        return Index(value, value * low, value * high)
+
+    @property
+    def Cpk(self) -> Index | None:
+        """Distance of the mean from the nearer limit over three standard deviations, its interval by Bissell (1990)."""
+        from scipy.special import ndtri
+
+        if self.limits is None or not self.scatter > 0.0:
+            return None
+        low, high = self.limits
+        value = min(high - self.mean, self.mean - low) / (3.0 * self.scatter)
+        n = len(self.values)
+        half = float(ndtri(0.5 * (1.0 + LIMITS.interval_level))) * math.sqrt(
+            1.0 / (9.0 * n) + value**2 / (2.0 * (n - 1))
+        )
+        return Index(value, value - half, value + half)
+
+    def trend(self, at: Array) -> tuple[float, float] | None:
+        """Slope over ``at`` (n of the fleet,) by Theil and Sen, and the p of Kendall's tau; None of under 8 units."""
+        from scipy.stats import kendalltau, theilslopes
+
+        x = at[list(self.places)]
+        if len(x) < 8 or not np.ptp(x) > 0.0 or not np.ptp(self.values) > 0.0:
+            return None
+        return float(theilslopes(self.values, x)[0]), float(kendalltau(x, self.values).pvalue)
+
+
+def spreads(rows: Sequence[UnitRow], specification: Specification) -> tuple[Spread, ...]:
+    """Every coefficient of the units that ended `ok`, in the unit of measurement of the first unit that has it."""
+    found: dict[str, list[tuple[int, int]]] = {}
+    for i, row in enumerate(rows):
+        for j, each in enumerate(row.coefficients if row.status == "ok" else ()):
+            if math.isfinite(each.value) and math.isfinite(each.u):
+                found.setdefault(each.name, []).append((i, j))
+    return tuple(_spread(name, places, rows, specification) for name, places in found.items())
+
+
+def _spread(
+    name: str, places: Sequence[tuple[int, int]], rows: Sequence[UnitRow], specification: Specification
+) -> Spread:
+    """The spread of one coefficient over the fleet."""
+    every = [rows[i].coefficients[j] for i, j in places]
+    unit = every[0].unit
+    same = [k for k, each in enumerate(every) if each.unit == unit]
+    return Spread(
+        name,
+        unit,
+        tuple(places[k][0] for k in same),
+        np.array([every[k].value for k in same]),
+        float(np.sqrt(np.mean([every[k].u ** 2 for k in same]))),
+        specification.of(name, unit),
+        tuple(i for i, _ in places if name in rows[i].outside),
+    )
+
 
 _FLEETS = 200
 _MANY = 200
@@ -51,7 +160,7 @@ def distances(values: Array) -> Array:
     if not _joint(*z.shape):
         farthest: Array = np.abs(z).max(axis=1)
         return farthest
-    size = int(_CORE * len(z))
+    size = int(LIMITS.core_share * len(z))
     norm = np.linalg.norm(z, axis=1, keepdims=True)
     signs = z / np.where(norm > 0.0, norm, 1.0)
     turned = z @ np.linalg.eigh(signs.T @ signs)[1]
@@ -69,7 +178,7 @@ def standardised(values: Array) -> Array:
 
 def _joint(units: int, coefficients: int) -> bool:
     """True if the units are enough for the covariance of the coefficients."""
-    return units >= max(FEWEST, 3 * coefficients)
+    return units >= max(LIMITS.fewest_units, 3 * coefficients)
 
 
 def _concentrated(z: Array, core: NDArray[np.intp]) -> tuple[Array, float]:
@@ -87,7 +196,7 @@ def _concentrated(z: Array, core: NDArray[np.intp]) -> tuple[Array, float]:
 
 
 def limit(units: int, coefficients: int) -> float:
-    """The distance that the farthest of so many sound units exceeds with the probability `RISK`."""
+    """The distance that the farthest of so many sound units exceeds with the probability `Limits.strange_risk`."""
     from scipy.special import chdtri
 
     found = _limit(min(units, _MANY), coefficients)
@@ -95,7 +204,7 @@ def limit(units: int, coefficients: int) -> float:
         return found
     # the distribution of many units is that of chi-square: its quantiles say how much farther the farthest of more lies
     p = coefficients if _joint(units, coefficients) else 1
-    far = [float(chdtri(p, -np.expm1(np.log1p(-RISK) / n))) for n in (units, _MANY)]
+    far = [float(chdtri(p, -np.expm1(np.log1p(-LIMITS.strange_risk) / n))) for n in (units, _MANY)]
     return found * float(np.sqrt(far[0] / far[1]))
 
 
@@ -104,11 +213,7 @@ def _limit(units: int, coefficients: int) -> float:
     """The limit, by simulated fleets."""
     rng = np.random.default_rng(20261123)
     farthest = [distances(rng.standard_normal((units, coefficients))).max() for _ in range(_FLEETS)]
-    return float(np.quantile(farthest, 1.0 - RISK))
-
-
-TREND_RISK = 0.01
-"""Probability that a fleet without any trend has one named."""
+    return float(np.quantile(farthest, 1.0 - LIMITS.strange_risk))
 
 
 @dataclass(frozen=True)
@@ -239,11 +344,11 @@ def _times(rows: Sequence[UnitRow]) -> tuple[Array, str]:
 
 
 def _trends(found: Sequence[Spread], at: Array) -> tuple[Trend, ...]:
-    """Coefficients with a trend, at a risk over all of `TREND_RISK`."""
+    """Coefficients with a trend, at a risk over all of `Limits.trend_risk`."""
     trends = []
     for spread in found:
         trend = spread.trend(at)
-        if trend is not None and trend[1] < TREND_RISK / len(found):
+        if trend is not None and trend[1] < LIMITS.trend_risk / len(found):
             trends.append(Trend(spread.name, trend[0], spread.unit, trend[1]))
     return tuple(sorted(trends, key=lambda each: each.p))
 
@@ -255,7 +360,7 @@ def _strange(found: Sequence[Spread]) -> tuple[tuple[Strange, ...], float]:
     most = max(len(spread.places) for spread in found)
     usual = [spread for spread in found if 2 * len(spread.places) > most]
     places = sorted(set.intersection(*(set(spread.places) for spread in usual)))
-    if len(places) < FEWEST:
+    if len(places) < LIMITS.fewest_units:
         return (), math.nan
     by_place = [dict(zip(spread.places, spread.values, strict=True)) for spread in usual]
     values = np.array([[own[place] for own in by_place] for place in places])

@@ -9,12 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from inercal.foundation._files import input_text
 from inercal.foundation.addresses import shown_address
 from inercal.foundation.errors import InputError
 from inercal.foundation.records.read import FORMATS
 from inercal.foundation.units import shown
 
-_EXPECTED = "expected a CSV with the header serial,files and a row for each unit, or a folder of recordings"
+_EXPECTED = "a CSV with the header serial,files and a row for each unit, or a folder of recordings"
 _LONGEST = 80
 """Characters of a serial number: it is the name of a file."""
 
@@ -67,7 +68,7 @@ def read_manifest(path: str | Path) -> tuple[FleetUnit, ...]:
     path = Path(path)
     units = list(_of_folder(path) if path.is_dir() else _of_rows(path))
     if not units:
-        raise InputError(path, f"holds no unit, {_EXPECTED}")
+        raise InputError(path, f"holds no unit, expected {_EXPECTED}")
     first: dict[str, FleetUnit] = {}
     for unit in units:
         if unit.serial in first:
@@ -101,12 +102,7 @@ def _is_recording(path: Path) -> bool:
 
 def _of_rows(path: Path) -> Iterator[FleetUnit]:
     """Each row of a manifest."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(path, f"cannot be read ({why}), {_EXPECTED}") from error
-    rows = csv.reader(text.splitlines(), strict=True)
+    rows = csv.reader(input_text(path, _EXPECTED).splitlines(), strict=True)
     try:
         head = [cell.strip() for cell in next(rows, [])]
         _check_head(head, path)
@@ -114,14 +110,14 @@ def _of_rows(path: Path) -> Iterator[FleetUnit]:
             if any(cell.strip() for cell in cells):
                 yield _of_row(head, [cell.strip() for cell in cells], path, rows.line_num)
     except csv.Error as error:
-        raise InputError(path, f"line {rows.line_num}: {error}, {_EXPECTED}") from error
+        raise InputError(path, f"line {rows.line_num}: {error}, expected {_EXPECTED}") from error
 
 
 def _check_head(head: list[str], path: Path) -> None:
     """Refuse a header without the two columns, with one twice, or with one that is no key."""
     for name in ("serial", "files"):
         if name not in head:
-            raise InputError(path, f"line 1: found no column {name!r}, {_EXPECTED}")
+            raise InputError(path, f"line 1: found no column {name!r}, expected {_EXPECTED}")
     for name in head:
         if head.count(name) > 1:
             raise InputError(path, f"line 1: found the column {shown(name)} twice, expected it once")

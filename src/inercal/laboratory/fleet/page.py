@@ -16,8 +16,8 @@ from inercal.faces.report.style import ALARM, COLOURS, QUIET
 from inercal.foundation.records.places import counted
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.results.shown import aligned, rounded
-from inercal.laboratory.fleet.capability import LEVEL, Index, Spread
-from inercal.laboratory.fleet.fleet import Fleet, Trend
+from inercal.laboratory.fleet.fleet import Fleet, Index, Spread, Trend
+from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import group_of
 
 _FIRST = 50
@@ -91,7 +91,7 @@ def result_of(fleet: Fleet) -> dict[str, Any]:
             "low": low,
             "high": high,
         },
-        "coverage_probability": LEVEL,
+        "coverage_probability": LIMITS.interval_level,
         "coefficients": [
             {
                 "name": each.name,
@@ -237,5 +237,5 @@ def page(fleet: Fleet, estimate: Estimate) -> str:
         per=fleet.per,
         look=[(fleet.rows[place].serial, words) for place, words in fleet.first[:_FIRST]],
         more=max(len(fleet.first) - _FIRST, 0),
-        level=f"{100.0 * LEVEL:.0f} %",
+        level=f"{100.0 * LIMITS.interval_level:.0f} %",
     )

@@ -2,7 +2,7 @@
 
 from alembic import context
 
-from inercal.laboratory.tables import Tables
+from inercal.laboratory.database import Tables
 
 context.configure(
     connection=context.config.attributes["connection"],

@@ -29,7 +29,7 @@ from inercal.systems.selfcal.platform.coefficients import product_slope, to_prod
 from inercal.systems.selfcal.settings import SelfcalSettings
 
 if TYPE_CHECKING:
-    from inercal.foundation.inference.coverage import Coverage, Nees
+    from inercal.foundation.inference.consistency import Coverage, Nees
 
 
 REFERENCES = (
@@ -123,14 +123,14 @@ class Campaign:
     @property
     def coverage(self) -> Coverage:
         """Coverage of the 95 % intervals."""
-        from inercal.foundation.inference.coverage import coverage
+        from inercal.foundation.inference.consistency import coverage
 
         return coverage(self.error, self.u)
 
     @property
     def nees(self) -> Nees:
         """Normalised estimation error squared of all coefficients together."""
-        from inercal.foundation.inference.coverage import nees
+        from inercal.foundation.inference.consistency import nees
 
         return nees(self.joint_error, self.joint_covariance)
 

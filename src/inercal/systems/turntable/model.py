@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.candidates import basis
+from inercal.foundation.designs.criteria import basis
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
@@ -254,7 +254,7 @@ def _references(settings: TurntableSettings) -> tuple[ReferenceInput, ...]:
 def orthonormal(model: TableModel, angles: Array) -> Array:
     """Functions (n, b) of the direction of gravity, orthonormal over the sphere: as many as the terms have orders.
 
-    Nine, up to second order, or four, up to first (`inercal.foundation.designs.candidates.basis`).
+    Nine, up to second order, or four, up to first (`inercal.foundation.designs.criteria.basis`).
     """
     quadratic = any(each.order > 1 for channel in model.channels for each in channel.monomials)
     made = basis(gravity_reference() @ model.chain.attitude(angles))

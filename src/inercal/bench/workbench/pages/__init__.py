@@ -18,7 +18,6 @@ def add_pages(bench: Bench) -> None:
         result,
         run,
         study,
-        validation,
     )
     from inercal.bench.workbench.pages.frame import framed, refused
 
@@ -27,5 +26,5 @@ def add_pages(bench: Bench) -> None:
             refused(error)
 
     app.on_page_exception(failed)
-    for page in (home, recording, study, design, run, result, live, instruments, validation):
+    for page in (home, recording, study, design, run, result, live, instruments):
         page.add(bench)

@@ -11,7 +11,8 @@ import numpy as np
 from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.jobs import ENDED, Job, JobState
+from inercal.bench.workbench.jobs import Job, JobState
+from inercal.bench.workbench.pages.form import lines_of, named, with_found, with_lines
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,
@@ -19,12 +20,10 @@ from inercal.bench.workbench.pages.frame import (
     framed,
     heading,
     refused,
-    report,
     table,
     told,
 )
-from inercal.bench.workbench.pages.run import WORDS
-from inercal.bench.workbench.plans import lines_of, named, with_found, with_lines
+from inercal.bench.workbench.pages.run import followed
 from inercal.bench.workbench.sessions import STUDY, Session, put
 from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres
@@ -270,24 +269,15 @@ class Desk:
             place = ui.element("div").classes("w-full")
         plan = job.folder / f"plan{self.plan.ending}"
 
-        def look() -> None:
-            now = self.bench.queue.get(job.id)
-            of = f": {now.progress}" if now.state is JobState.RUNNING and now.progress else ""
-            what = "search" if self.plan.ending else "comparison"
-            state.set_text(f"The {what} (job {now.id}) {WORDS[now.state]}{of}")
-            if now.state not in ENDED:
-                return
-            timer.deactivate()
-            with place:
-                if now.said.strip() and now.state is not JobState.DONE:
-                    refused(InercalError(now.said.strip()))
-                if self.plan.ending and plan.is_file():
-                    button("Take the plan found", lambda: self.take(plan.read_text()), main=True)
-                if now.report is not None:
-                    report(now, "search for a plan")
+        def ended(now: Job) -> None:
+            if now.said.strip() and now.state is not JobState.DONE:
+                refused(InercalError(now.said.strip()))
+            if self.plan.ending and plan.is_file():
+                button("Take the plan found", lambda: self.take(plan.read_text()), main=True)
 
+        what = f"The {'search' if self.plan.ending else 'comparison'} (job {job.id})"
         with self.found:
-            timer = ui.timer(0.3, look)
+            followed(self.bench, job, state, what, "search for a plan", place, ended)
 
     async def take(self, found: str) -> None:
         """Write the plan found into the study."""

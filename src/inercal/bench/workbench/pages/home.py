@@ -12,7 +12,7 @@ from inercal.bench.workbench.jobs import ENDED, Job, JobState
 from inercal.bench.workbench.pages.frame import button, framed, heading, table, told
 from inercal.bench.workbench.sessions import Session
 from inercal.examples import EXAMPLES, Example
-from inercal.faces.python.beginning import PLANNED
+from inercal.faces.python.study import PLANNED
 from inercal.systems.listed import SYSTEMS
 
 _SHOWN = 20

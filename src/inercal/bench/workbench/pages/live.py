@@ -13,9 +13,8 @@ from typing import Any
 from nicegui import ui
 
 from inercal.bench.live.address import SINKS, SOURCES
-from inercal.bench.workbench import live_pictures
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.live_status import rows, status
+from inercal.bench.workbench.live_status import KEPT, drawable, row_figure, rows, status, words_of
 from inercal.bench.workbench.measurements import (
     MEASURED,
     Wish,
@@ -213,7 +212,7 @@ class _View:
         with ui.element("div").classes("w-full grid grid-cols-1 md:grid-cols-2 gap-6"):
             with ui.element("div").classes("w-full"):
                 self.choice = ui.select([], label="Over time", on_change=self.chosen).classes("w-full")
-                self.plot = ui.plotly(live_pictures.figure([], [], "")).classes("w-full")
+                self.plot = ui.plotly(row_figure([], [], "")).classes("w-full")
                 self.plot.props('aria-label="the quantity over time, with its band" role="group"')
             with ui.element("div").classes("w-full"):
                 heading("Now")
@@ -245,16 +244,16 @@ class _View:
         if new["next"] == self.next:
             return
         self.next = new["next"]
-        self.rows = (self.rows + new["rows"])[-live_pictures.KEPT :]
+        self.rows = (self.rows + new["rows"])[-KEPT:]
         if new["columns"] != self.columns:
             self.columns = new["columns"]
-            titles = list(live_pictures.drawable(self.columns))
+            titles = list(drawable(self.columns))
             self.choice.set_options(titles, value=titles[0] if titles else None)
         self.draw()
 
     def draw(self) -> None:
         """Draw the rows."""
-        self.plot.update_figure(live_pictures.figure(self.columns, self.rows, self.title))
+        self.plot.update_figure(row_figure(self.columns, self.rows, self.title))
 
     def _alarms(self, found: Sequence[dict[str, Any]]) -> None:
         """The newest messages, where there are other ones."""
@@ -287,7 +286,7 @@ class _Values:
             self._make(list(found))
         for name, (value, unit) in self.cells.items():
             each = found[name]
-            value.set_text(live_pictures.words_of(each["value"], each["u"]))
+            value.set_text(words_of(each["value"], each["u"]))
             unit.set_text("" if each["unit"] == "1" else each["unit"])
 
     def _make(self, names: list[str]) -> None:

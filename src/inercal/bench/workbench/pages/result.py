@@ -8,9 +8,10 @@ from urllib.parse import urlencode
 
 from nicegui import events, ui
 
-from inercal.bench.workbench.advice import Advice, advice_of
 from inercal.bench.workbench.bench import Bench
+from inercal.bench.workbench.charts import parts_of, residual_figure, span_of
 from inercal.bench.workbench.jobs import Job, JobState
+from inercal.bench.workbench.pages.form import Advice, advice_of
 from inercal.bench.workbench.pages.frame import (
     PATIENCE,
     button,
@@ -24,7 +25,6 @@ from inercal.bench.workbench.pages.frame import (
     table,
     told,
 )
-from inercal.bench.workbench.residuals import figure, parts_of, span_of
 from inercal.bench.workbench.sessions import Session
 from inercal.faces.python.result import Result
 from inercal.foundation._files import read_bytes
@@ -120,7 +120,7 @@ def _residuals(session: Session, result: Result) -> None:
     if not parts:
         return
     heading("Residuals")
-    plot = picture(figure(parts), "residuals over time")
+    plot = picture(residual_figure(parts), "residuals over time")
     place = ui.element("div").props('aria-live="polite" data-chosen="1"')
     with place:
         ui.label("Click one to see its samples.").classes("quiet text-sm")
@@ -132,7 +132,7 @@ def _residuals(session: Session, result: Result) -> None:
         label = str(points[0]["customdata"])
         begin, end = span_of(parts, label)
         margin = 0.5 * (end - begin) + 1.0
-        plot.update_figure(figure(parts, label))
+        plot.update_figure(residual_figure(parts, label))
         place.clear()
         with place:
             target = urlencode({"begin": begin - margin, "end": end + margin})

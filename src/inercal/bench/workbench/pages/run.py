@@ -1,21 +1,22 @@
-"""Run: what a job is at, cancel, the queue; the page only looks, the job goes on without it."""
+"""Run, and validation: the state of a job, cancel, the queue; the page only looks, the job goes on without it."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from nicegui import ui
 
-from inercal.bench.workbench.bench import Bench
+from inercal.bench.workbench.bench import VALIDATION, Bench
 from inercal.bench.workbench.jobs import ENDED, Job, JobState
-from inercal.bench.workbench.pages.frame import button, command, framed, heading, table, told
+from inercal.bench.workbench.pages.frame import button, command, framed, heading, report, table, told
 from inercal.bench.workbench.sessions import Session
 from inercal.foundation.records.places import counted
 
 _EVERY = 0.3
 """Time [s] between two looks at a job."""
 
-WORDS = {
+_WORDS = {
     JobState.WAITING: "waits for the jobs before it",
     JobState.RUNNING: "is running",
     JobState.DONE: "is done",
@@ -26,7 +27,24 @@ WORDS = {
 
 
 def add(bench: Bench) -> None:
-    """Add the page."""
+    """Add the pages: of a session, and of the validation."""
+
+    @ui.page("/validation")
+    def validation() -> None:
+        with framed("Validation"):
+            ui.label("Published and closed-form cases that ship with inercal, run on this machine.")
+
+            def begin() -> None:
+                with told():
+                    bench.validate()
+                    ui.navigate.reload()
+
+            button("Run the validation", begin, main=True)
+            command("inercal validate --report validation.html")
+            if (job := next((job for job in bench.queue if job.session == VALIDATION), None)) is not None:
+                state = ui.label().classes("verdict").props('role="status"')
+                place = ui.element("div").classes("w-full")
+                followed(bench, job, state, f"Job {job.id}", "record of the validation", place)
 
     @ui.page("/sessions/{number}/run")
     def show(number: str) -> None:
@@ -87,12 +105,38 @@ def _follow(bench: Bench, session: Session, job: Job) -> None:
     timer = ui.timer(_EVERY, look)
 
 
+def followed(
+    bench: Bench,
+    job: Job,
+    state: ui.label,
+    what: str,
+    title: str,
+    place: ui.element,
+    ended: Callable[[Job], None] = lambda _: None,
+) -> None:
+    """Tell the ``state`` of ``what`` until it has ended; its report, under its ``title``, then stands in ``place``."""
+
+    def look() -> None:
+        now = bench.queue.get(job.id)
+        progress = f": {now.progress}" if now.state is JobState.RUNNING and now.progress else ""
+        state.set_text(f"{what} {_WORDS[now.state]}{progress}")
+        if now.state not in ENDED:
+            return
+        timer.deactivate()
+        with place:
+            ended(now)
+            if now.report is not None:
+                report(now, title)
+
+    timer = ui.timer(_EVERY, look)
+
+
 def _words(bench: Bench, job: Job) -> str:
     """The state of a job; where it waits, for how many."""
     before = sum(each.state not in ENDED and each.id < job.id for each in bench.queue)
     if job.state is JobState.WAITING and before:
         return f"waits for {counted(before, 'job')} before it"
-    return WORDS[job.state]
+    return _WORDS[job.state]
 
 
 def part_of(progress: str) -> float | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from nicegui import events, ui
 
 from inercal.bench.workbench.bench import Bench
-from inercal.bench.workbench.form import FormKey, FormTable, as_toml, problem, tables
+from inercal.bench.workbench.pages.form import FormKey, FormTable, as_toml, problem, tables
 from inercal.bench.workbench.pages.frame import button, command, copy, framed, heading, refused, saved, told
 from inercal.bench.workbench.sessions import STUDY, Session, put
 from inercal.faces.studies.text import changed, parsed

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column
+from inercal.foundation.records.limits import LIMITS
 from inercal.foundation.records.places import counted, places
 from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
 
@@ -49,10 +50,6 @@ def plateaus(step: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return starts[long], ends[long]
 
 
-_JITTER = 8.0
-"""Median deviations of intervals from the median by which one is longer at least where samples are missing."""
-
-
 def time_axis(t: Array, subject: str = "t") -> list[Finding]:
     """``duplicate_time``, ``backward_time``, ``gap`` and ``rate_change`` of a time axis (n,) [s].
 
@@ -79,7 +76,10 @@ def time_axis(t: Array, subject: str = "t") -> list[Finding]:
         step = step / np.diff(rows)
     parts = np.array_split(step, np.clip(step.size // 100, 1, 20))
     medians = [np.median(part[part > 0]) if (part > 0).any() else 0.0 for part in parts]
-    jitter = [_JITTER * np.median(np.abs(part - middle)) for part, middle in zip(parts, medians, strict=True)]
+    jitter = [
+        LIMITS.gap_deviations * np.median(np.abs(part - middle))
+        for part, middle in zip(parts, medians, strict=True)
+    ]
     limits = [
         max(1.5 * max(medians[near]), max(medians[near]) + max(jitter[near]))
         for near in (slice(max(index - 1, 0), index + 2) for index in range(len(parts)))
@@ -139,9 +139,6 @@ def time_unit(t: Array, subject: str = "t") -> list[Finding]:
 
 _CORRECT = "Correct the unit in the header or the map."
 
-_AROUND = 42
-_FEWEST = 10
-
 
 def saturation(values: Array, name: str) -> list[Finding]:
     """``saturation``: three or more equal samples at an extreme that motion has run into."""
@@ -164,7 +161,7 @@ def saturated(values: Array) -> NDArray[np.int64]:
     """
     none = np.zeros(0, dtype=np.int64)
     signal = numbers(values)
-    if signal.size < _FEWEST:
+    if signal.size < LIMITS.fewest_samples:
         return none
     low, high = signal.min(), signal.max()
     if max(np.count_nonzero(signal == low), np.count_nonzero(signal == high)) < 3:
@@ -222,12 +219,12 @@ def outlying(values: Array) -> NDArray[np.int64]:
     so that motion is measured against motion.
     """
     signal = numbers(values)
-    if signal.size <= _AROUND:
+    if signal.size <= LIMITS.outlier_steps:
         return np.zeros(0, dtype=np.int64)
     every = (signal.size - 1) // SAMPLE + 1
     usual = np.abs(signal[1::every] - signal[:-1:every])
     noise = max(np.median(usual) / 0.674, usual.min(initial=np.inf, where=usual > 0))
-    windows = sliding_window_view(signal, _AROUND + 1)
+    windows = sliding_window_view(signal, LIMITS.outlier_steps + 1)
     peaks = []
     for first in range(0, signal.size - 2, SAMPLE // 4):  # what a processor keeps near
         step = np.diff(signal[first : first + SAMPLE // 4 + 2])
@@ -235,9 +232,9 @@ def outlying(values: Array) -> NDArray[np.int64]:
         suspects = large[:-1][np.diff(large) == 1]
         suspects = suspects[(step[suspects] > 0) != (step[suspects + 1] > 0)]
         height = np.minimum(np.abs(step[suspects]), np.abs(step[suspects + 1]))
-        near = windows[np.clip(first + suspects - _AROUND // 2, 0, len(windows) - 1)]
+        near = windows[np.clip(first + suspects - LIMITS.outlier_steps // 2, 0, len(windows) - 1)]
         steps = np.abs(np.diff(near, axis=1))
-        moved = np.partition(steps, _AROUND - 5, axis=1)[:, _AROUND - 5] / 1.645
+        moved = np.partition(steps, LIMITS.outlier_steps - 5, axis=1)[:, LIMITS.outlier_steps - 5] / 1.645
         peaks.append(first + suspects[height > 12.0 * moved])
     return rows_of(values, np.concatenate(peaks) + 1)
 
@@ -309,4 +306,4 @@ def is_dead(values: Array) -> bool:
         signal = numbers(part)
         if (signal != signal[:1]).any():
             return False
-    return signal.size >= _FEWEST
+    return signal.size >= LIMITS.fewest_samples

@@ -279,8 +279,7 @@ def _tell(progress: Callable[[int, int], None] | None, before: int, total: int, 
 def _form(path: Path, part: FileShare) -> Reader:
     """The module that reads a file as its part of the map says; raises `RecordError` if there is none."""
     if not part.options.binary:
-        form = format_of(path)
-        return _module("transposed") if part.options.transpose and form is _module("text") else form
+        return format_of(path)
     if not path.is_file():
         raise RecordError(path, "found no such file, expected a recording")
     return _module("binary")

@@ -11,7 +11,12 @@ import numpy as np
 
 from inercal.faces.report.coefficients import correlation
 from inercal.faces.report.html import Picture, render
-from inercal.faces.report.over_time import (
+from inercal.foundation.arrays import Array
+from inercal.foundation.geometry.rotations import principal
+from inercal.foundation.units import STANDARD_GRAVITY
+from inercal.systems.aoa.angles import gives_alpha
+from inercal.systems.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
+from inercal.systems.aoa.figures.panels import (
     Flags,
     Marks,
     Signals,
@@ -20,17 +25,12 @@ from inercal.faces.report.over_time import (
     largest,
     measured,
     middle,
+    of_angle,
     over_time,
     rms,
     span,
     stretches,
 )
-from inercal.faces.report.spectra import of_angle
-from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.rotations import principal
-from inercal.foundation.units import STANDARD_GRAVITY
-from inercal.systems.aoa.angles import gives_alpha
-from inercal.systems.aoa.figures.learned import coefficients, consistency, flexure, lever_arms
 from inercal.systems.aoa.figures.sensors import fitted, points, side_by_side, side_view
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.pauses import at_rest

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.faces.report import innovations as white_noise
+from inercal.faces.report import courses as white_noise
 from inercal.faces.report.courses import CoefficientCourse, converging, falling
 from inercal.faces.report.html import Picture
-from inercal.faces.report.over_time import Marks, Signals, largest, middle, over_time, rms
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.aoa.figures import sensors
+from inercal.systems.aoa.figures.panels import Marks, Signals, largest, middle, over_time, rms
 from inercal.systems.aoa.layout import all_weights, centrifugal_arms, tangential_arms
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import settled

@@ -25,7 +25,7 @@ from inercal.systems.aoa.reading.recording import Recording, later, set_back
 
 
 class LiveState(NamedTuple):
-    """State after a row, in the sense of `inercal.foundation.computing.checkpoint`.
+    """State after a row, in the sense of `inercal.faces.stream.checkpoint`.
 
     ``fusion`` is the state of the filter, ``waiting`` (j,) [s] the stamps of the rows that are not answered yet, and
     ``late`` the number of successive rows at the end that are not later than those before.

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import CODES, Finding, Status, causes
-from inercal.foundation.inference.factor import NEGATIVE
 from inercal.foundation.inference.identifiability import UNSEEN
+from inercal.foundation.inference.sigma_point import NEGATIVE
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import FusionResult

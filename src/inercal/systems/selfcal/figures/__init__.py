@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.report.coefficients import budget, correlation
-from inercal.faces.report.courses import CoefficientCourse, converging, falling, lines_by_group
+from inercal.faces.report.courses import (
+    CoefficientCourse,
+    converging,
+    falling,
+    innovations,
+    lines_by_group,
+    nis,
+)
 from inercal.faces.report.html import Picture, render
-from inercal.faces.report.innovations import innovations, nis
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import boxminus
 from inercal.systems.selfcal.figures.filters import (

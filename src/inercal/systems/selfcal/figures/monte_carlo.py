@@ -13,7 +13,7 @@ from inercal.faces.report.marks import Area, Axis, Dots, Level, Line, Mark, Pane
 from inercal.faces.report.panels import draw
 from inercal.faces.report.style import ALARM, COLOURS, INK, QUIET
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.coverage import Coverage
+from inercal.foundation.inference.consistency import Coverage
 from inercal.systems.selfcal.estimators import ESTIMATORS
 from inercal.systems.selfcal.figures.design import facts
 from inercal.systems.selfcal.result.tables import campaign_table

@@ -23,8 +23,8 @@ import numpy as np
 from inercal.foundation._jit import allocating, kernel
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.kernels import Vector
-from inercal.foundation.inference.factor import FACTORS
 from inercal.foundation.inference.sigma_point import (
+    FACTORS,
     draw,
     empty_moments,
     empty_points,

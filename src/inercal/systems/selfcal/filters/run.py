@@ -9,7 +9,7 @@ from types import ModuleType
 
 import numpy as np
 
-from inercal.foundation.inference.factor import NEGATIVE
+from inercal.foundation.inference.sigma_point import NEGATIVE
 from inercal.systems.selfcal.estimators import FilterKind
 from inercal.systems.selfcal.filters import error_state, gimbal, quaternion
 from inercal.systems.selfcal.filters.batch import estimate_map

@@ -12,8 +12,17 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.computing.executors import Executor
-from inercal.foundation.designs.candidates import Candidates, insensitive, within
-from inercal.foundation.designs.criteria import Criterion, D, PlanFigures, a_criterion, i_criterion, judge
+from inercal.foundation.designs.criteria import (
+    Candidates,
+    Criterion,
+    D,
+    PlanFigures,
+    a_criterion,
+    i_criterion,
+    insensitive,
+    judge,
+    within,
+)
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.errors import StudyError

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.candidates import within
-from inercal.foundation.designs.criteria import a_criterion
+from inercal.foundation.designs.criteria import a_criterion, within
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.tolerances import Price, Ratios, cheapest, tightest, total
 from inercal.foundation.errors import InputError, StudyError

@@ -1,7 +1,9 @@
-"""``inercal live``."""
+"""An instrument by wire and the workbench: ``inercal live`` and ``workbench``."""
 
 from __future__ import annotations
 
+import getpass
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -12,14 +14,16 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_INTERRUPTED, abandon_output
-from inercal.cli.options import MapFile, OutputOptions, Overrides
-from inercal.cli.streaming import Every, StreamOptions, interval_of
+from inercal.cli.options import MapFile, OutputOptions, Overrides, StoreOption, StudyFile, map_in
+from inercal.cli.outcome import timed
+from inercal.cli.streaming import Every, StreamOptions, interval_of, settle_lines
 from inercal.foundation.errors import InercalError, InputError
 
 if TYPE_CHECKING:
     from inercal.bench.live.address import Sink
     from inercal.bench.live.measurement import RunningMeasurement
     from inercal.faces.stream.estimators import Make, Say, SayFinding
+
 
 _EVERY = 30.0
 """Time [s] from one line of counts to the next."""
@@ -35,10 +39,7 @@ def live(
     ],
     /,
     *,
-    study: Annotated[
-        Path | None,
-        Parameter(help="Study file (TOML); `inercal new` writes one."),
-    ] = None,
+    study: StudyFile | None = None,
     calibration: Annotated[
         Path | None,
         Parameter(name="--apply", help="Calibration to correct the samples with, in the place of a study."),
@@ -54,13 +55,12 @@ def live(
     every: Every = None,
     map_file: MapFile = None,
     overrides: Overrides = None,
-    streaming: StreamOptions = StreamOptions(),  # noqa: B008  (frozen)
-    output: OutputOptions = OutputOptions(),  # noqa: B008  (frozen)
+    streaming: StreamOptions = StreamOptions(),
+    output: OutputOptions = OutputOptions(),
 ) -> int:
     """Measure an instrument by wire."""
     from inercal.bench.live.address import sink_of, source_of
     from inercal.bench.live.measurement import MeasurementPlan, RunningMeasurement
-    from inercal.faces.stream.run import Saving
 
     wire = source_of(source)
     sinks = [sink_of(each) for each in to or ("text:-",)]
@@ -68,18 +68,9 @@ def live(
     streaming.check(output, (map_file, study, calibration, wire_file))
     if streaming.after is not None:
         raise InputError("--after", "found with a live source, expected it with a stream that begins anew")
-    record_map = None
-    if map_file is not None:
-        from inercal.foundation.records.maps import read_map
-
-        record_map = read_map(map_file)
-    saving = None
-    if streaming.checkpoint is not None:
-        saving = Saving(streaming.checkpoint, streaming.checkpoint_every)
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # as in a file
+    settle_lines()
     make = _estimator(study, calibration, overrides or [], interval_of(every))
-    plan = MeasurementPlan(wire, make, record_map, record, sinks, saving)
+    plan = MeasurementPlan(wire, make, map_in(map_file), record, sinks, streaming.saving)
     return _followed(RunningMeasurement(plan, output.say, output.say_finding, _print), output)
 
 
@@ -120,19 +111,15 @@ def _estimator(
 
 def _check(source: Path | None, record: Path | None, sinks: list[Sink]) -> None:
     """Refuse one place for two things; raises `InputError`."""
-    files = [each for each in (source, record, *(_place(sink) for sink in sinks)) if each is not None]
+    from inercal.bench.live.address import target
+
+    files = [each for each in (source, record, *map(target, sinks)) if each is not None]
     names = [realpath(each) for each in files]
     for place, name in zip(files, names, strict=True):
         if names.count(name) > 1:
             raise InputError(place, "found it for two things, expected a name for each")
     if len(set(map(str, sinks))) < len(sinks):
         raise InputError("--to", "found a sink twice, expected each once")
-
-
-def _place(sink: Sink) -> Path | None:
-    """The file or folder of a sink."""
-    place: Path | None = getattr(sink, "file", None) or getattr(sink, "folder", None)
-    return place
 
 
 def _followed(measurement: RunningMeasurement, output: OutputOptions) -> int:
@@ -175,3 +162,67 @@ def _print(text: str) -> None:
     except BrokenPipeError:
         abandon_output()
         raise OSError("its reader has left") from None
+
+
+_PASSWORD = "INERCAL_WORKBENCH_PASSWORD"
+"""Variable of the environment that holds the password for other machines."""
+
+
+def workbench(
+    folder: Annotated[
+        Path | None, Parameter(help="Work folder, for sessions and jobs; the user's own if absent.")
+    ] = None,
+    /,
+    *,
+    port: Annotated[int, Parameter(help="Port to listen at; a free one if 0.")] = 0,
+    host: Annotated[
+        str,
+        Parameter(
+            help="Address to listen at. Beyond this machine a password is asked for, and whoever is on the network "
+            "can read what is sent."
+        ),
+    ] = "127.0.0.1",
+    browser: Annotated[bool, Parameter(name="--no-browser", negative="", help="Open no browser.")] = False,
+    store: StoreOption = None,
+    output: OutputOptions = OutputOptions(),
+) -> None:
+    """Serve the workbench until it is asked to end."""
+    from platformdirs import user_data_path
+
+    from inercal.bench.workbench.bench import open_bench
+    from inercal.bench.workbench.serve import HERE, Door, serve
+    from inercal.foundation.results.files import to_json
+    from inercal.foundation.results.result import without_coefficients
+
+    if not 0 <= port <= 65535:
+        raise InputError("--port", f"found {port}, expected a number from 0 to 65535")
+    password = "" if host == HERE else _password(host)
+    root = folder or user_data_path("inercal", appauthor=False) / "workbench"
+    bench = open_bench(root.absolute(), store)
+
+    def tell(address: str) -> None:
+        words = f"inercal workbench: {address}"
+        found = to_json(timed(without_coefficients("workbench", words, {})))
+        output.emit(
+            {**found, "result": {"address": address}}, words
+        )  # with its key, which is meant for the reader
+
+    try:
+        serve(bench, Door(host, port, password), tell, not browser)
+    finally:
+        bench.close()
+
+
+def _password(host: str) -> str:
+    """The password that browsers of other machines need; raises `InputError` for one of fewer than 12 characters."""
+    given = os.environ.get(_PASSWORD)
+    if given is None and sys.stdin is not None and sys.stdin.isatty():
+        print(
+            f"The workbench will be reachable at {host}: without encryption, by all who know this password."
+        )
+        given = getpass.getpass("Password: ")
+    if not given or len(given) < 12:
+        raise InputError(
+            "--host", f"needs a password of 12 characters or more, at the prompt or in {_PASSWORD}"
+        )
+    return given

@@ -19,7 +19,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from inercal.foundation._files import read_bytes, write_bytes
+from inercal.foundation._files import input_bytes, write_bytes
 from inercal.foundation.errors import InputError
 
 S = TypeVar("S")
@@ -45,12 +45,7 @@ def load(path: str | Path, kind: str, fingerprint: str, like: S) -> S:
     have other lengths. Raises `InputError` without a file, for no checkpoint, a damaged one, or one of another kind, of
     other settings or of another form.
     """
-    try:
-        data = read_bytes(path)
-    except OSError as error:
-        raise InputError(
-            path, f"cannot be read ({error.strerror or error}), expected a checkpoint"
-        ) from error
+    data = input_bytes(path, "a checkpoint")
     head, _, body = data.partition(b"\n")
     words = head.removeprefix(_MAGIC).split()
     if not head.startswith(_MAGIC) or len(words) != 2:
