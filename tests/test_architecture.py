@@ -203,7 +203,7 @@ WITHIN = {
         "positions rate steps task figures verbs system"
     ),
     "aoa": (
-        "estimators limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis "
+        "estimators limits alarm band layout disturbances motion settings angles reading fusion paper diagnosis "
         "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (

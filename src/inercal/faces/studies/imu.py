@@ -9,29 +9,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from inercal.faces.studies.common import (
-    Conditions,
-    ConditionsTable,
-    SiteTable,
-    Traceability,
-    TraceabilityTable,
-    Version,
-    site_of,
-)
+from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.laboratory import (
-    Equipment,
-    Item,
-    ItemTable,
-    Laboratory,
-    LaboratoryTable,
-    Tolerances,
-    traced,
-)
 from inercal.faces.studies.rig import RigTable, chain_of
-from inercal.faces.studies.tables import as_typed, settings_of, table_of
+from inercal.faces.studies.tables import settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -242,11 +225,9 @@ class SimulationTable(table_of(Simulation)):  # type: ignore[misc]
     )
 
 
-class ImuStudyFile(Strict):
+class ImuStudyFile(StudyFile):
     """A study for ``inercal calibrate imu``."""
 
-    version: Version = 1
-    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
     imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
     simulation: SimulationTable = Field(
         default=SimulationTable(), title="Simulation", description="a simulated recording"
@@ -256,12 +237,6 @@ class ImuStudyFile(Strict):
         title="Disturbances",
         description="what a simulation adds to the model",
     )
-    item: Item = ItemTable()
-    laboratory: Laboratory = LaboratoryTable()
-    equipment: Equipment
-    specification: Tolerances
-    traceability: Traceability = TraceabilityTable()
-    conditions: Conditions = ConditionsTable()
 
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuStudyFile:
@@ -351,9 +326,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),
-        traceability=traced(file.traceability.model_dump(), file.item),
         method=_method(file.imu, path),
-        temperature=file.conditions.temperature,
         exclude=exclusion_of(file.imu.exclude),
-        given=as_typed(data),
+        **file.shared(data),
     )

@@ -11,25 +11,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, StrictInt, create_model, field_validator
 
-from inercal.faces.studies.common import (
-    Conditions,
-    ConditionsTable,
-    SiteTable,
-    Traceability,
-    TraceabilityTable,
-    Version,
-    site_on_earth,
-)
+from inercal.faces.studies.common import SiteTable, StudyFile, site_on_earth
 from inercal.faces.studies.fields import QuantityText, Several, SeveralTexts, positive, refusal
-from inercal.faces.studies.laboratory import (
-    Equipment,
-    Item,
-    ItemTable,
-    Laboratory,
-    LaboratoryTable,
-    Tolerances,
-    traced,
-)
 from inercal.faces.studies.platform import (
     CommandTable,
     GimbalsTable,
@@ -43,7 +26,7 @@ from inercal.faces.studies.platform import (
 )
 from inercal.faces.studies.platform_model import LEFT_OUT, ModelTable, model_of, on_rig, true_errors
 from inercal.faces.studies.rig import Angle
-from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
+from inercal.faces.studies.tables import Stated, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
@@ -193,11 +176,9 @@ class DisturbancesTable(_ON_RIG):  # type: ignore[misc]
     )
 
 
-class SelfcalStudyFile(Strict):
+class SelfcalStudyFile(StudyFile):
     """A study of a self-calibration, for `inercal simulate selfcal`, `design selfcal` and `selfcal`."""
 
-    version: Version = 1
-    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
     rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
     records: list[PlacedRecordTable] = Field(
         default=[],
@@ -224,12 +205,6 @@ class SelfcalStudyFile(Strict):
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
     design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
-    item: Item = ItemTable()
-    laboratory: Laboratory = LaboratoryTable()
-    equipment: Equipment
-    specification: Tolerances
-    traceability: Traceability = TraceabilityTable()
-    conditions: Conditions = ConditionsTable()
 
 
 def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
@@ -258,9 +233,7 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         disturbances=_disturbances(file.disturbances),
         search=settings_of(Search, file.design, robust=tuple(file.design.robust)),
         placed=tuple(_placed(each, file) for each in file.records),
-        traceability=traced(file.traceability.model_dump(), file.item),
-        temperature=file.conditions.temperature,
-        given=as_typed(data),
+        **file.shared(data),
     )
 
 

@@ -9,29 +9,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictInt
 
-from inercal.faces.studies.common import (
-    Conditions,
-    ConditionsTable,
-    SiteTable,
-    Traceability,
-    TraceabilityTable,
-    Version,
-    site_on_earth,
-)
+from inercal.faces.studies.common import StudyFile, site_on_earth
 from inercal.faces.studies.fields import QuantityText
 from inercal.faces.studies.instrument import InstrumentTable, instrument_of
-from inercal.faces.studies.laboratory import (
-    Equipment,
-    Item,
-    ItemTable,
-    Laboratory,
-    LaboratoryTable,
-    Tolerances,
-    traced,
-)
 from inercal.faces.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
 from inercal.faces.studies.rig import Angle, Limits, RigTable, chain_of, limits_of
-from inercal.faces.studies.tables import as_typed, settings_of, table_of
+from inercal.faces.studies.tables import settings_of, table_of
 from inercal.faces.studies.tolerances import CostsTable, WantedTable, tolerances_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import QuantityError, StudyError
@@ -215,11 +198,9 @@ class StepTestTable(table_of(StepTest)):  # type: ignore[misc]
     )
 
 
-class TurntableStudyFile(Strict):
+class TurntableStudyFile(StudyFile):
     """A study of a turntable, for `inercal sensitivity`, `design positions`, `simulate` and `calibrate turntable`."""
 
-    version: Version = 1
-    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the table stands")
     rig: RigTable = Field(title="Rig", description="the turntable and its errors")
     positions: PositionsTable = Field(
         default=PositionsTable(), title="Positions", description="where to stop; a grid of 10 deg if absent"
@@ -246,12 +227,6 @@ class TurntableStudyFile(Strict):
     cost: CostsTable = Field(
         default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
     )
-    item: Item = ItemTable()
-    laboratory: Laboratory = LaboratoryTable()
-    equipment: Equipment
-    specification: Tolerances
-    traceability: Traceability = TraceabilityTable()
-    conditions: Conditions = ConditionsTable()
 
 
 def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSettings:
@@ -277,9 +252,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         step_test=None if file.step_test is None else _step_test(file.step_test, chain, path),
         disturbances=disturbances_of(file.disturbances, instrument.unit, chain, path),
         tolerances=tolerances_of(file.goal, file.cost, chain, instrument, site.gravity, path),
-        traceability=traced(file.traceability.model_dump(), file.item),
-        temperature=file.conditions.temperature,
-        given=as_typed(data),
+        **file.shared(data),
     )
 
 
