@@ -207,8 +207,8 @@ WITHIN = {
         "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (
-        "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
-        "result task several figures verbs system"
+        "estimators limits platform disturbances settings still_joints filters before diagnosis find_base monte_carlo "
+        "reading result task several figures verbs system"
     ),
 }
 

@@ -102,6 +102,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: found {shown(value)}, expected a list in brackets"
         case "too_short":
             return f"{key}: found {shown(value)}, expected {first['ctx']['min_length']} or more in it"
+        case "too_long":
+            return f"{key}: found {shown(value)}, expected {first['ctx']['max_length']} or fewer in it"
         case "string_too_short":
             return f"{key}: found {shown(value)}, expected a text that is not empty"
         case "int_type" | "int_from_float":

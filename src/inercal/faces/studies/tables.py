@@ -8,7 +8,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model
 from pydantic_core import core_schema
@@ -42,6 +42,12 @@ def table_of(settings: type, tables: bool | None = None) -> Any:
 def settings_of(settings: type[T], *tables: Any, **more: Any) -> T:
     """The settings that tables state, and ``more`` of their fields; those of absent keys are as usual."""
     return settings(**_stated(settings, tables) | more)
+
+
+def replaced(usual: T, *tables: Any) -> T:
+    """The ``usual`` settings with what tables state."""
+    made: T = dataclasses.replace(cast(Any, usual), **_stated(type(usual), tables))
+    return made
 
 
 def _stated(settings: type, tables: Sequence[Any]) -> dict[str, Any]:
@@ -89,9 +95,7 @@ class _Reader:
             if "kind" in type(table).model_fields:
                 check_kind(source, table, table.kind)
             try:
-                if self.usual is None:
-                    return settings_of(source, table)
-                return dataclasses.replace(self.usual, **_stated(source, [table]))
+                return settings_of(source, table) if self.usual is None else replaced(self.usual, table)
             except InputError as error:
                 raise refusal(error.message, error.where) from error
 
@@ -173,14 +177,12 @@ def _type(key: Key, hint: Any, default: Any) -> Any:
         one = Annotated[Quantity, read]
         if key.of:
             one = Annotated[Several, SeveralTexts(read, key.of, one=key.one)]
-            if get_args(hint)[-1] is not Ellipsis:
-                return one
     elif key.reads:
         one = Annotated[Any, _Parsed(key.reads)]
     else:
         return _plain(hint)
-    shape = get_origin(hint)
-    return list[one] if shape is tuple else dict[str, one] if shape is Mapping else one
+    shape, several = get_origin(hint), get_args(hint)[-1:] == (Ellipsis,)
+    return list[one] if shape is tuple and several else dict[str, one] if shape is Mapping else one
 
 
 def _plain(hint: Any) -> Any:
