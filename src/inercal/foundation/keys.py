@@ -23,6 +23,9 @@ class Bounds:
     words: str
 
 
+OUTPUT = "output"
+"""Dimension of a quantity in the unit of an instrument's outputs: it stays a text until that is known."""
+
 ANYTHING = Bounds(lambda value: True, "")
 
 
@@ -195,11 +198,10 @@ def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:
             yield each, key
 
 
-def unheeded(settings: type, kind: object) -> dict[str, tuple[str, ...]]:
-    """Keys of a table that some ``kind`` does not heed, each with the kinds that do; none for a kind that is none."""
+def unheeded(settings: type, kind: str) -> dict[str, tuple[str, ...]]:
+    """Keys of a table that some ``kind`` does not heed, each with the kinds that do."""
     limited = {key.name or field.name: key.kinds for field, key in keys_of(settings) if key.kinds}
-    known = any(kind in kinds for kinds in limited.values())
-    return {name: kinds for name, kinds in limited.items() if known and kind not in kinds}
+    return {name: kinds for name, kinds in limited.items() if kind not in kinds}
 
 
 GONE: Mapping[tuple[str, str], str] = {

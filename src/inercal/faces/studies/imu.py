@@ -14,7 +14,7 @@ from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, sec
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
 from inercal.faces.studies.rig import RigTable, chain_of
-from inercal.faces.studies.tables import settings_of, table_of
+from inercal.faces.studies.tables import check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -84,14 +84,10 @@ def aided_settings(table: AidedTable, where: object) -> AidedSettings:
     return AidedSettings(chain, None if azimuth is None else azimuth.u)
 
 
-#: keys that not all methods heed -> those that do
+#: keys beside those of the settings that not all methods heed -> those that do
 _METHODS = {
-    "static_start": ("multiposition",),
-    "g_sensitivity": ("multiposition", "aided"),
-    "bias_drift": ("multiposition",),
     "exclude": ("multiposition", "means", "known_rates"),
     "k2": ("multiposition", "ferraris", "means", "aided"),
-    "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
     "alignment": ("known_turns",),
@@ -187,24 +183,14 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         """Refuse what the method does not heed."""
         for key in ("rates", "turns"):
             if self.method == f"known_{key}" and not getattr(self, key):
-                raise refusal(f"{key}: missing, expected it with method = {self.method!r}")
+                raise refusal(f"missing, expected it with method = {self.method!r}", key)
+        check_kind(ImuSettings, self, self.method, "method")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
-                raise refusal(
-                    f"{key}: found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
-                )
+                words = f"found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
+                raise refusal(words, key)
         return self
-
-
-#: keys of simulations that not all methods heed -> those that do
-_SIMULATED = {
-    "poses": ("multiposition",),
-    "start": ("multiposition", "aided"),
-    "restless_start": ("multiposition", "ferraris"),
-    "lever_arm": ("aided",),
-    "delay": ("aided",),
-}
 
 
 class ImuDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
@@ -241,14 +227,8 @@ class ImuStudyFile(StudyFile):
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuStudyFile:
         """Refuse what the simulation of the method does not heed."""
-        for table, given in (("simulation", self.simulation), ("disturbances", self.disturbances)):
-            for key in sorted(given.model_fields_set):
-                methods = _SIMULATED.get(key, ())
-                if methods and self.imu.method not in methods:
-                    raise refusal(
-                        f"{table}.{key}: found with method = {self.imu.method!r}, expected it with "
-                        f"{' or '.join(methods)} only"
-                    )
+        check_kind(Simulation, self.simulation, self.imu.method, "method", "simulation.")
+        check_kind(Disturbances, self.disturbances, self.imu.method, "method", "disturbances.")
         return self
 
 

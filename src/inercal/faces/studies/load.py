@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from inercal.faces.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
 from inercal.foundation._toml import read_toml
@@ -214,9 +214,9 @@ def _make_room(table: dict[str, Any], name: str, key: str) -> None:
 
 def _of_other_motions(kind: object) -> Iterable[str]:
     """Keys of a motion that belong to other kinds alone."""
-    from inercal.systems.aoa.motion import MotionPlan
+    from inercal.systems.aoa.motion import MotionKind, MotionPlan
 
-    return unheeded(MotionPlan, kind)
+    return unheeded(MotionPlan, str(kind)) if kind in get_args(MotionKind) else ()
 
 
 def _value(text: str) -> Any:

@@ -16,7 +16,7 @@ from pydantic_core import core_schema
 from inercal.faces.studies.fields import ExactText, QuantityText, Several, SeveralTexts, Word, refusal
 from inercal.foundation._toml import Strict, settings_in
 from inercal.foundation.errors import InputError
-from inercal.foundation.keys import Key, Reading, keys_of, unheeded
+from inercal.foundation.keys import OUTPUT, Key, Reading, keys_of, unheeded
 from inercal.foundation.units import Quantity
 
 T = TypeVar("T")
@@ -31,7 +31,10 @@ def table_of(settings: type, tables: bool | None = None) -> Any:
     hints = get_type_hints(settings)
     system = settings.__module__.split(".")[:3][-1].capitalize()
     fields: dict[str, Any] = {
-        key.name or field.name: (_type(key, hints[field.name], field.default), _described(key, field))
+        key.name or field.name: (
+            _type(key, hints[field.name], field.default),
+            _described(key, field, hints[field.name]),
+        )
         for field, key in keys_of(settings)
         if tables in (None, key.table)
     }
@@ -167,6 +170,8 @@ def _type(key: Key, hint: Any, default: Any) -> Any:
     one: Any
     if key.table:
         one = Annotated[settings_in(hint), _Reader(default if is_dataclass(default) else None)]
+    elif key.dimension == OUTPUT:
+        one = str
     elif key.dimension:
         text = ExactText if key.exact else QuantityText
         example = key.example
@@ -196,13 +201,15 @@ def _plain(hint: Any) -> Any:
     return hint
 
 
-def _described(key: Key, field: dataclasses.Field[Any]) -> Any:
+def _described(key: Key, field: dataclasses.Field[Any], hint: Any) -> Any:
     """Meaning, default and bounds of a field; an absent quantity is None, the settings know what it stands for."""
     default = field.default if field.default_factory is MISSING else {}
     plain = not (key.dimension or key.table)
-    listed = isinstance(default, tuple) or key.several
+    listed = get_origin(hint) is tuple
     absent = ... if default is MISSING else None if key.dimension else list(default) if listed else default
-    quantity = key.dimension and not (listed or key.words or key.of or isinstance(default, dict))
+    quantity = key.dimension not in ("", OUTPUT) and not (
+        listed or key.words or key.of or isinstance(default, dict)
+    )
     title = (key.name or field.name).replace("_", " ").capitalize() if key.table and not listed else None
     return Field(
         default=absent,
