@@ -18,7 +18,8 @@ from aoa_tunnels import STUDY
 from independent.aoa import DEG, G
 
 from inercal.systems.aoa.disturbances import Disturbances, Shaking
-from inercal.systems.aoa.settings import AoaSettings, MotionPlan
+from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.settings import AoaSettings
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure
 

@@ -20,11 +20,11 @@ from inercal.faces.studies.load import load_selfcal_study
 from inercal.foundation.geometry.rotations import boxplus
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
-from inercal.systems.selfcal.settings import Disturbances
 
 SEED = 20261121
 STUDY = load_selfcal_study(FOLDER / "selfcal.toml")
@@ -132,7 +132,7 @@ def disturbed(name):
         case "base turned by 5 arcsec":
             truth[21] = np.radians(5.0 / 3600.0)
         case "encoder error of 5 arcsec, twice a turn":
-            wave = (2, 2, float(np.radians(5.0 / 3600.0)), 0.4)
+            wave = EncoderHarmonic("z", 2, float(np.radians(5.0 / 3600.0)), 0.4)
             return replace(STUDY, disturbances=Disturbances(harmonics=(wave,)))
         case "10 % of the samples missing":
             return replace(STUDY, disturbances=Disturbances(dropouts=0.1))

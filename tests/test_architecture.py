@@ -203,12 +203,12 @@ WITHIN = {
         "positions rate steps task figures verbs system"
     ),
     "aoa": (
-        "estimators limits alarm band layout disturbances settings angles motion reading fusion paper diagnosis "
+        "estimators limits alarm band layout disturbances motion settings angles reading fusion paper diagnosis "
         "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (
-        "estimators limits platform settings still_joints filters before diagnosis find_base monte_carlo reading "
-        "result task several figures verbs system"
+        "estimators limits platform disturbances settings still_joints filters before diagnosis find_base monte_carlo "
+        "reading result task several figures verbs system"
     ),
 }
 

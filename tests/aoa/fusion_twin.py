@@ -94,8 +94,8 @@ class Twin:
         for s, output, of in (("s_z", "flexure_z", prior.heave), ("s_x", "flexure_x", prior.axial)):
             if s in self.place:
                 a, b = self.place[s], self.place[output]
-                A[a, b], A[b, a], A[b, b] = 1.0, -(of.frequency**2), -2.0 * of.damping * of.frequency
-                N[b, b] = 4.0 * of.damping * of.frequency * of.level**2
+                A[a, b], A[b, a], A[b, b] = 1.0, -(of.omega**2), -2.0 * of.damping * of.omega
+                N[b, b] = 4.0 * of.damping * of.omega * of.level**2
         for name, k in self.place.items():
             if name.startswith("b_"):
                 of_gyro = name in ("b_g", "b_roll", "b_yaw")

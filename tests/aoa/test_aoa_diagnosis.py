@@ -15,8 +15,9 @@ from inercal.systems.aoa.diagnosis.examination import diagnose
 from inercal.systems.aoa.diagnosis.fit_quality import fit_quality
 from inercal.systems.aoa.diagnosis.noise_check import scatter
 from inercal.systems.aoa.disturbances import Disturbances, Oscillation
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain
-from inercal.systems.aoa.settings import Estimator, MotionPlan
+from inercal.systems.aoa.settings import Estimator
 from inercal.systems.aoa.simulate import simulate
 
 SWEEP = study(motion=MotionPlan("static", duration=3.0, first=-10.0 * DEG, last=60.0 * DEG))

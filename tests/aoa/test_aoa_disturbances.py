@@ -12,7 +12,8 @@ from inercal.foundation.findings import Status
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
 from inercal.systems.aoa.disturbances import AngleShaking, Disturbances, Mains, Plunge, Shaking, VibrationLine
-from inercal.systems.aoa.settings import MotionPlan, Noise
+from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.settings import Noise
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure
 

@@ -11,7 +11,8 @@ from inercal.systems.aoa.diagnosis.examination import diagnose
 from inercal.systems.aoa.disturbances import Disturbances, Shaking
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
-from inercal.systems.aoa.settings import MotionPlan, Prior
+from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.settings import Prior
 from inercal.systems.aoa.simulate import simulate
 
 

@@ -21,14 +21,15 @@ from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain
-from inercal.systems.aoa.settings import Attitude, Estimator, MotionPlan, Prior, Resonance, Timing
+from inercal.systems.aoa.settings import Attitude, Estimator, Heave, Prior, Timing
 from inercal.systems.aoa.simulate import simulate
 
 ROLLED = Attitude(roll=Quantity(0.5, 1e-3, parse_unit("rad"), ""))
 COUPLED = Disturbances(yaw=Oscillation(1.0 * DEG, 8.0), roll=Oscillation(2.0 * DEG, 3.0))
 WANDERING = replace(NOISE, accelerometer_walk=1e-3 * G, gyro_walk=0.1 * DEG)
-PLUNGING = replace(Prior(), heave=Resonance(25.0, 0.9, 0.3, vertical=True))
+PLUNGING = replace(Prior(), heave=Heave(25.0 / (2.0 * math.pi), 0.9, 0.3, "vertical"))
 CASES = {
     "8": ({"states": 8}, False),
     "11, rolled": ({"states": 11, "attitude": ROLLED}, False),

@@ -16,10 +16,11 @@ from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.angles import Angles, stated_roll
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.result.columns import angles_record, beyond_limits, columns, points_record, rows
 from inercal.systems.aoa.result.points import points
 from inercal.systems.aoa.result.systematic import by_fusion, by_methods
-from inercal.systems.aoa.settings import Attitude, Methods, MotionPlan
+from inercal.systems.aoa.settings import Attitude, Methods
 from inercal.systems.aoa.simulate import simulate
 
 PAUSES = MotionPlan(

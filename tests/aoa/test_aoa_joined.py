@@ -12,10 +12,11 @@ from test_aoa_runs import STUDY
 from inercal.cli import run
 from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain, triggered
 from inercal.systems.aoa.result.balance import clock_offset, join, read_balance
 from inercal.systems.aoa.result.points import points
-from inercal.systems.aoa.settings import MotionPlan, PointPlan
+from inercal.systems.aoa.settings import PointPlan
 from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each
 

@@ -14,7 +14,7 @@ from sting_study import BASE, DEG, study
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.layout import Layout
-from inercal.systems.aoa.settings import MotionPlan
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.simulate import drawn_biases, simulate
 
 REST = MotionPlan("static", duration=120.0, sample_rate=100.0, first=20.0 * DEG, last=20.0 * DEG)

@@ -15,12 +15,13 @@ from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
 from inercal.systems.aoa.result.budget import parts
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
 from inercal.systems.aoa.result.systematic import by_fusion, by_methods
 from inercal.systems.aoa.result.verification import errors
-from inercal.systems.aoa.settings import Attitude, Estimator, Methods, MotionPlan, Timing, Zero
+from inercal.systems.aoa.settings import Attitude, Estimator, Methods, Timing, Zero
 from inercal.systems.aoa.simulate import simulate
 
 UNCERTAIN = Site(G, (GravityInput("gravity", 1e-3, "m/s^2", 1.0),))

@@ -15,7 +15,8 @@ from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.limits import LIMITS
-from inercal.systems.aoa.settings import Estimator, MotionPlan, Noise, Prior, Resonance
+from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.settings import Estimator, Heave, Noise, Prior
 from inercal.systems.aoa.simulate import simulate
 
 
@@ -299,8 +300,8 @@ ABSURD = {
     "huge snap": {"estimator": Estimator(snap=1e20)},
     "no gate": {"estimator": Estimator(gate=math.inf)},
     "a gate for nothing": {"estimator": Estimator(gate=1e-6)},
-    "a stiff sting": {"prior": Prior(heave=Resonance(1e6, 0.5, 0.1))},
-    "a slack sting": {"prior": Prior(heave=Resonance(1e-3, 0.01, 0.1))},
+    "a stiff sting": {"prior": Prior(heave=Heave(1e6, 0.5, 0.1))},
+    "a slack sting": {"prior": Prior(heave=Heave(1e-3, 0.01, 0.1))},
 }
 READINGS = (math.inf, -math.inf, 1e300, 1e20, -1e5)
 

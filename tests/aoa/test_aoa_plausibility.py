@@ -13,8 +13,9 @@ from inercal.systems.aoa.disturbances import Disturbances, Oscillation
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.filter_result import of_fusion as of_filter
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.result.verdict import of_fusion
-from inercal.systems.aoa.settings import MotionPlan, Timing
+from inercal.systems.aoa.settings import Timing
 from inercal.systems.aoa.simulate import simulate
 
 SHORT = study(motion=replace(BASE, duration=1.6))

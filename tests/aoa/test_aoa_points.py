@@ -12,11 +12,11 @@ from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.angles import Angles, stated_roll, theta_by_roll
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
-from inercal.systems.aoa.motion import Sines, buffet
+from inercal.systems.aoa.motion import MotionPlan, Sines, buffet
 from inercal.systems.aoa.reading.pauses import at_rest, pauses
 from inercal.systems.aoa.reading.recording import COSINES, mean_u, plain
 from inercal.systems.aoa.result.points import points
-from inercal.systems.aoa.settings import Attitude, MotionPlan
+from inercal.systems.aoa.settings import Attitude
 from inercal.systems.aoa.simulate import simulate
 from rows import for_each
 

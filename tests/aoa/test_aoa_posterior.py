@@ -16,11 +16,12 @@ from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reference.corrections import corrected as put_right
 from inercal.systems.aoa.reference.sensor_fit import fit
 from inercal.systems.aoa.result.carry_over import corrected, load
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
-from inercal.systems.aoa.settings import MotionPlan, SensorCalibration
+from inercal.systems.aoa.settings import SensorCalibration
 from inercal.systems.aoa.simulate import drawn_biases, simulate
 from rows import for_each
 

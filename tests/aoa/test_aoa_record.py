@@ -14,9 +14,9 @@ from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
 from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.disturbances import Disturbances, Oscillation
-from inercal.systems.aoa.motion import buffet, course, duration
+from inercal.systems.aoa.motion import MotionPlan, buffet, course, duration
 from inercal.systems.aoa.reading.from_record import recording_of
-from inercal.systems.aoa.settings import MotionPlan, SensorCalibration
+from inercal.systems.aoa.settings import SensorCalibration
 from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each
 

@@ -9,9 +9,9 @@ from sting_study import DEG, G, study
 
 from inercal.foundation.errors import RecordError
 from inercal.systems.aoa.disturbances import Disturbances
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.reference.static_fit import at_rests_alone, static_fit
-from inercal.systems.aoa.settings import MotionPlan
 from inercal.systems.aoa.simulate import simulate, to_record
 from inercal.systems.aoa.task import measure
 

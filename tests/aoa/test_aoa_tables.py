@@ -14,6 +14,7 @@ from inercal.foundation.results.files import save, to_json
 from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reference.corrections import report_of
 from inercal.systems.aoa.reference.sensor_fit import fit
 from inercal.systems.aoa.result.carry_over import corrected
@@ -35,7 +36,7 @@ from inercal.systems.aoa.result.tables import (
     use_of_fit,
 )
 from inercal.systems.aoa.result.verification import errors
-from inercal.systems.aoa.settings import MotionPlan, SensorCalibration, Timing
+from inercal.systems.aoa.settings import SensorCalibration, Timing
 from inercal.systems.aoa.simulate import simulate
 
 PAUSES = MotionPlan(

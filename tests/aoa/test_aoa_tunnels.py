@@ -21,7 +21,7 @@ from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.result.verification import late_reference
-from inercal.systems.aoa.settings import Estimator, Prior, Resonance
+from inercal.systems.aoa.settings import Estimator, Heave, Prior
 
 SEEDS = 2
 BUFFETS = [name for name in CASES if name.startswith("buffet")]
@@ -210,7 +210,7 @@ def chosen_again(said, chosen):
         r'frequency = "(.*) Hz", damping = "(.*)", level = "(.*) g", direction = "vertical"', said.message
     )
     frequency, damping, level = map(float, told.groups())
-    heave = Resonance(2.0 * np.pi * frequency, damping, level * STANDARD_GRAVITY, vertical=True)
+    heave = Heave(frequency, damping, level * STANDARD_GRAVITY, "vertical")
     return replace(chosen, prior=replace(chosen.prior, heave=heave))
 
 

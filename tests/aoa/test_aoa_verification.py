@@ -9,11 +9,11 @@ from sting_study import DEG, G, layout, study
 
 from inercal.foundation.errors import RecordError
 from inercal.systems.aoa.angles import Angles
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.reference.readings import reference
 from inercal.systems.aoa.reference.sensor_fit import _linearised, fit, fit_terms
 from inercal.systems.aoa.result.verification import errors
-from inercal.systems.aoa.settings import MotionPlan
 from inercal.systems.aoa.simulate import simulate
 
 WIDE = MotionPlan(

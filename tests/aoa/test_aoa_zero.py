@@ -10,9 +10,10 @@ from sting_study import DEG, NOISE, G, study
 from inercal.foundation.errors import RecordError
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.reading.wind_off_zero import at_rest, tare, with_zero
-from inercal.systems.aoa.settings import MotionPlan, Noise, Zero
+from inercal.systems.aoa.settings import Noise, Zero
 from inercal.systems.aoa.simulate import simulate
 
 REST = MotionPlan("buffet", duration=8.0, sample_rate=500.0, mean=20.0 * DEG, rms=0.0)

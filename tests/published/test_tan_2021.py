@@ -21,9 +21,10 @@ from sting_study import DEG, G, clipped, layout, scenario, study
 from inercal.systems.aoa.disturbances import Disturbances
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.paper import lever, residuals, static
 from inercal.systems.aoa.paper.methods import low_passed, measure
-from inercal.systems.aoa.settings import Methods, MotionPlan, Noise, Timing
+from inercal.systems.aoa.settings import Methods, Noise, Timing
 from inercal.systems.aoa.simulate import simulate
 
 DA, DW, L = 1e-4 * G, 0.2 * DEG, 0.5

@@ -10,10 +10,10 @@ from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.foundation.geometry.rotations import exp, rotate
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.rig import Base
-from inercal.systems.selfcal.settings import Disturbances
 
 PROBLEM = problem(study())
 
@@ -202,7 +202,7 @@ def test_a_heading_that_is_not_that_of_the_base():
 
 @pytest.mark.slow
 def test_an_encoder_with_a_periodic_error():
-    other = Disturbances(harmonics=((0, 8, 3.0 * ARCSEC, 0.5),))
+    other = Disturbances(harmonics=(EncoderHarmonic("x", 8, 3.0 * ARCSEC, 0.5),))
     only(named(recording(disturbances=other)), "unmodelled", "th_x errs periodically", "8 periods a turn")
 
 

@@ -8,11 +8,12 @@ from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from inercal.systems.selfcal.platform.states import BIAS_WALK, EXTENDED_MODEL
-from inercal.systems.selfcal.settings import Disturbances, Noise, PlatformStates
+from inercal.systems.selfcal.settings import Noise, PlatformStates
 
 STUDY = study(path="best")
 COARSE = Noise(0.1 * DEG / 60.0, 5000.0 * MICRO_G, 600.0 * ARCSEC)
@@ -53,7 +54,9 @@ def test_noise_of_coarse_encoders_is_no_periodic_error(arcseconds):
 def test_a_periodic_error_of_a_coarse_encoder_is_found_all_the_same():
     """60 arcsec at 12 periods a turn, in noise of 60 arcsec: some 400 of the 2700 rows turn about th_x."""
     coarse = replace(STUDY, noise=replace(STUDY.noise, encoder=60.0 * ARCSEC))
-    erring = replace(coarse, disturbances=Disturbances(harmonics=((0, 12, 60.0 * ARCSEC, 0.3),)))
+    erring = replace(
+        coarse, disturbances=Disturbances(harmonics=(EncoderHarmonic("x", 12, 60.0 * ARCSEC, 0.3),))
+    )
     found = only(named(recorded(erring), coarse), "unmodelled")
     assert "th_x errs periodically" in found.message
     assert "12 periods a turn" in found.message

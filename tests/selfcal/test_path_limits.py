@@ -17,7 +17,7 @@ from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_product
-from inercal.systems.selfcal.platform.joint_limits import ANY, ForbiddenAngles, JointLimits, beyond
+from inercal.systems.selfcal.platform.joint_limits import ForbiddenAngles, JointLimits, beyond
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Search
@@ -60,7 +60,7 @@ def test_turns_gain_and_lose_their_rates():
 
 
 def test_a_region_is_the_same_whole_turns_on():
-    region = ForbiddenAngles(((80 * D, 130 * D), (20 * D, 60 * D), ANY))
+    region = ForbiddenAngles((80 * D, 130 * D), (20 * D, 60 * D))
     rng = np.random.default_rng(20261124)
     for _ in range(200):
         start = rng.uniform(-720 * D, 720 * D, 3)
@@ -75,8 +75,8 @@ def test_a_region_is_the_same_whole_turns_on():
 def limited():
     joints = JointLimits(
         rate=(1.0 * D, 0.5 * D, np.inf), acceleration=(0.05 * D, 0.1 * D, 2.0 * D),
-        forbidden=(ForbiddenAngles(((80 * D, 130 * D), (20 * D, 70 * D), ANY)), ForbiddenAngles((ANY, ANY, (100 * D, 140
-        * D)))),
+        forbidden=(ForbiddenAngles((80 * D, 130 * D), (20 * D, 70 * D)),
+                   ForbiddenAngles(None, None, (100 * D, 140 * D))),
     )  # fmt: skip
     asked = Search(turns=6, angle=30.0 * D, time=500.0, closed=True, rest=6.0, criterion="mean")
     present = replace(path("paper"), rate=2.0 * D)
@@ -216,11 +216,11 @@ def test_a_study_states_what_joints_can(tmp_path):
 @pytest.mark.parametrize(
     ("more", "typed", "said"),
     [
-        ("forbidden = [{}]\n", "", r"rig\.forbidden\[1\]: found no angles"),
+        ("forbidden = [{}]\n", "", r"rig\.forbidden\.0: found no angles"),
         (
             '[[rig.forbidden]]\nx = ["9 deg", "1 deg"]\n',
             "",
-            r"rig\.forbidden\[1\]\.x: found .*lower end first",
+            r"rig\.forbidden\.0\.x: found .*lower end first",
         ),
         ('joint_rate = "0 deg/s"\n', "", r"rig\.joint_rate: .*above zero"),
         ('[design]\nrobust = ["warp"]\n', "", r"design\.robust"),
@@ -248,7 +248,7 @@ def test_a_plan_beyond_the_joints_is_not_simulated(tmp_path, more, typed, said):
 
 
 def test_a_search_that_cannot_begin_is_refused(limited):
-    at_start = JointLimits(forbidden=(ForbiddenAngles((ANY, (-1 * D, 1 * D), ANY)),))
+    at_start = JointLimits(forbidden=(ForbiddenAngles(None, (-1 * D, 1 * D)),))
     with pytest.raises(StudyError, match="start of the path in a forbidden region"):
         search(replace(limited, joints=at_start))
     with pytest.raises(StudyError, match=r"design\.robust: found kg0, which is among the states"):

@@ -20,6 +20,7 @@ from inercal.foundation.geometry.rotations import (
     rotate,
 )
 from inercal.systems.selfcal.before.simulate import experiment, flicker, simulate, to_record
+from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic, Sway
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.platform import model
@@ -29,7 +30,7 @@ from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, moti
 from inercal.systems.selfcal.platform.rig import Base, Gimbals
 from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
 from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
-from inercal.systems.selfcal.settings import Disturbances, Noise
+from inercal.systems.selfcal.settings import Noise
 
 PLAN = PlatformPlan(
     (Turn("z", 60 * DEG), Turn("x", 90 * DEG), Turn("y", 40 * DEG), Rest(4.0)),
@@ -232,7 +233,8 @@ def test_dropouts_take_whole_rows_at_the_stated_part():
 
 def test_harmonics_are_errors_of_the_encoders_alone():
     """a sin(k th + phase) of the joint's own true angle; the platform does not know of them."""
-    harmonics = ((2, 2, 300 * ARCSEC, 0.4), (0, 1, 100 * ARCSEC, 0.0), (2, 5, 50 * ARCSEC, -1.0))
+    waves = [("z", 2, 300 * ARCSEC, 0.4), ("x", 1, 100 * ARCSEC, 0.0), ("z", 5, 50 * ARCSEC, -1.0)]
+    harmonics = tuple(EncoderHarmonic(*wave) for wave in waves)
     _, plain = run(9, noise=SILENT)
     _, found = run(9, noise=SILENT, disturbances=Disturbances(harmonics=harmonics))
     assert_array_equal(found.attitude, plain.attitude)
@@ -321,7 +323,7 @@ def test_a_base_that_sways_moves_the_encoders_alone():
     """About two level axes, a quarter of a period apart: a turn of one size, and none about the vertical."""
     size = 3 * ARCSEC
     settings, still = run(noise=SILENT)
-    _, swaying = run(noise=SILENT, disturbances=Disturbances(base_sway=(size, 0.3)))
+    _, swaying = run(noise=SILENT, disturbances=Disturbances(base_sway=Sway(size, 0.3)))
     assert_allclose(swaying.recording.acc, still.recording.acc, atol=1e-15)
     read, _ = gimbals(swaying.recording.th, settings.world)
     was, _ = gimbals(still.recording.th, settings.world)

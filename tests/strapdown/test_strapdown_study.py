@@ -34,7 +34,7 @@ def test_the_least_study_and_its_defaults():
     assert settings.rests.velocity == pytest.approx(1e-4)
     assert (settings.frame, settings.terms) == ("upper", ("k2", "size", "delay"))
     assert settings.rests.attitude is None
-    assert settings.start.compass is None
+    assert settings.start.heading is None
     assert settings.plan is None
 
 
@@ -66,8 +66,8 @@ D_F_y = "1 deg/h"
     assert "gyro_walk" not in settings.noise.estimate
     assert settings.rests.attitude == pytest.approx(np.radians(0.01))
     assert settings.rests.list == ((0.0, 10.0), (12.0, 20.0))
-    assert settings.start.heading == pytest.approx(np.radians(30.0))
-    assert settings.start.heading_u == pytest.approx(np.radians(5.0))
+    assert settings.start.angle == pytest.approx(np.radians(30.0))
+    assert settings.start.u == pytest.approx(np.radians(5.0))
     assert settings.plan.turns == ((1, pytest.approx(-np.pi / 2)), (2, pytest.approx(-np.pi)))
     assert settings.truth == pytest.approx(
         {

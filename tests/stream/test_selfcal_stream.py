@@ -17,6 +17,7 @@ from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
 from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
+from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.filters.filter_result import product_form
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -24,7 +25,7 @@ from inercal.systems.selfcal.platform.coefficients import KA1, names
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.result.columns import history_record
-from inercal.systems.selfcal.settings import Disturbances, Filter, Gating
+from inercal.systems.selfcal.settings import Filter, Gating
 
 DEG = np.pi / 180.0
 RECURSIVE = ("error-state", "svd-qukf", "gimbal-ukf")

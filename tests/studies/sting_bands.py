@@ -7,8 +7,9 @@ from sting_study import DEG, clipped, scenario, study
 
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.paper.methods import low_passed, measure
-from inercal.systems.aoa.settings import Methods, MotionPlan
+from inercal.systems.aoa.settings import Methods
 from inercal.systems.aoa.simulate import simulate
 
 FILTERS = ("causal 8", "smoothed 8", "causal 19", "smoothed 19")

@@ -8,7 +8,8 @@ import numpy as np
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.aoa.disturbances import Disturbances, Shaking
 from inercal.systems.aoa.layout import Layout
-from inercal.systems.aoa.settings import AoaSettings, Estimator, MotionPlan, Noise, SensorCalibration
+from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.settings import AoaSettings, Estimator, Noise, SensorCalibration
 
 G = 9.80665
 DEG = math.pi / 180.0

@@ -4,6 +4,7 @@ import copy
 import json
 import re
 import tomllib
+from typing import get_args
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,12 +15,11 @@ from sting_study import DEG, scenario
 from sting_text import same
 
 from inercal.faces.studies.aoa import aoa_study
-from inercal.faces.studies.motion import _KEYS
 from inercal.faces.studies.schema import json_schema
 from inercal.foundation.errors import StudyError
-from inercal.systems.aoa.settings import (
-    Zero,
-)
+from inercal.foundation.keys import keys_of
+from inercal.systems.aoa.motion import MotionKind, MotionPlan
+from inercal.systems.aoa.settings import Zero
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -46,12 +46,13 @@ def values():
     return found
 
 
-@pytest.mark.parametrize("kind", _KEYS)
+@pytest.mark.parametrize("kind", get_args(MotionKind))
 def test_the_motions_of_the_template_load_with_their_keys(kind, tmp_path):
     """With just the keys that a kind needs and heeds."""
     shown = values()["motion"]
+    heeded = [key.name or field.name for field, key in keys_of(MotionPlan) if kind in key.kinds]
     data = tomllib.loads(TEMPLATE)
-    data["motion"] = {"kind": kind, **{key: shown[key] for keys in _KEYS[kind] for key in keys}}
+    data["motion"] = {"kind": kind, **{key: shown[key] for key in heeded}}
     VALIDATOR.validate(data)
     assert aoa_study(data, tmp_path / "t.toml").motion.kind == kind
 

@@ -301,7 +301,7 @@ def load(tmp_path):
         ),
         (
             DESIGN + 'sensitivity = { factors = ["dtheta_x"], outputs = ["ax"], below = 0 }',
-            "design.sensitivity.below: found 0, expected greater than 0",
+            "design.sensitivity.below: found 0, expected a number above 0, at most 1",
         ),
         (DESIGN + "sensitivity = {}", "design.sensitivity.factors: missing, expected a value"),
         (HEAD + "[rate_test]\nrates = []", "rate_test.rates: found [], expected 1 or more in it"),

@@ -19,6 +19,7 @@ from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.rigs.tables import slots
 from inercal.foundation.units import STANDARD_GRAVITY
+from inercal.systems.turntable.settings import JointAngles
 from rows import for_each
 
 ARCMIN = math.radians(1.0 / 60.0)
@@ -415,7 +416,7 @@ def test_design_and_rate_test():
     assert found.rate_test.full_scale == pytest.approx(math.radians(100.0))
     assert_allclose(np.degrees(found.rate_test.rates), [-10.0, 10.0])
     assert (found.rate_test.order, found.rate_test.rate_u) == (3, pytest.approx(2e-5))
-    assert found.rate_test.at == {"phi2": pytest.approx(math.pi / 2)}
+    assert found.rate_test.at == JointAngles(phi2=pytest.approx(math.pi / 2))
 
 
 def test_terms_of_a_rate_test():

@@ -23,7 +23,13 @@ from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.figures import pictures
 from inercal.systems.turntable.rate.fit import approaches, levels
 from inercal.systems.turntable.rate.stays import RateDwells, arc, gyro_input, sensed
-from inercal.systems.turntable.settings import Instrument, PositionDesign, RateTest, TurntableSettings
+from inercal.systems.turntable.settings import (
+    Instrument,
+    JointAngles,
+    PositionDesign,
+    RateTest,
+    TurntableSettings,
+)
 from inercal.systems.turntable.task import calibrate, simulate
 
 DEG = np.pi / 180.0
@@ -268,9 +274,7 @@ def test_earth_rate_alone_leaves_400_ppm_of_the_scale_factor_and_a_rate_test_a_f
 def test_part_turns_matter_to_an_oblique_gyro():
     """At 7 deg/s for 20 s the table turns by 140 deg: the part of earth rate across the axis does not average out."""
     told = {"dwell": 20.0, "coefficients": {"S_x": 1.0, "S_y": 1.0, "S_z": 1.0}}
-    settings = study(
-        (-9, -5, -2, 0, 2, 5, 7), mounting=OBLIQUE, instrument=told, at={"phi1": 0.7, "phi2": 1.0}
-    )
+    settings = study((-9, -5, -2, 0, 2, 5, 7), mounting=OBLIQUE, instrument=told, at=JointAngles(0.7, 1.0))
     test = simulate(settings, np.random.default_rng(1))
     right = calibrate(test, settings).estimate
     blind = calibrate(without(test, "phi2"), settings).estimate

@@ -197,7 +197,7 @@ def test_what_a_file_does_not_tell_is_said():
 
 def test_a_simulated_test_by_legs():
     """Each error of the table keeps its value from leg to leg; the file says which joint turns."""
-    legs = (Leg("phi1"), Leg("phi1", {"phi2": 90.0 * DEG}), Leg("phi2"))
+    legs = (Leg(joint="phi1"), Leg(joint="phi1", phi2=90.0 * DEG), Leg(joint="phi2"))
     of = settings(ERRORS, noise=NOISE, rates=tuple(RATES), legs=legs)
     given = {f"S_{axis}": value for axis, value in S.items()} | {k: v * ARCSEC for k, v in T.items()}
     of = replace(of, instrument=replace(of.instrument, coefficients=given))

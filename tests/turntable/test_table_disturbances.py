@@ -11,7 +11,7 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.rigs.plans import grid
 from inercal.systems.turntable.positions.simulate import simulate
-from inercal.systems.turntable.settings import Disturbances, RateTest
+from inercal.systems.turntable.settings import Disturbances, RateTest, TableHarmonic
 from inercal.systems.turntable.task import simulate as simulate_test
 
 PLAN = grid((6, 6))
@@ -91,7 +91,7 @@ def test_a_base_that_is_turned_and_tilted():
 
 def test_encoders_that_err():
     amplitude, phase = np.radians(0.1), 0.4
-    wavy, _ = outputs(study(plan=PLAN), harmonics=(("phi2", 2, amplitude, phase),))
+    wavy, _ = outputs(study(plan=PLAN), harmonics=(TableHarmonic("phi2", 2, amplitude, phase),))
     angles = PLAN.angles.copy()
     angles[:, 1] += amplitude * np.sin(2 * angles[:, 1] + phase)
     a, w = references(angles, {})

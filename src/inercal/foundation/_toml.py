@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -60,8 +60,8 @@ def check(model: type[M], data: Mapping[str, Any], where: object, error: type[In
         first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), faults[0])
         cause = first.get("ctx", {}).get("error")
         if isinstance(cause, InputError):
-            at = f"{_dotted(first['loc'])}: " if first["loc"] else ""
-            raise error(where, f"{at}{cause.message}") from problem
+            at = ".".join(filter(None, (_dotted(first["loc"]), cause.where)))
+            raise error(where, f"{at}: {cause.message}" if at else cause.message) from problem
         raise error(where, _sentence(model, first)) from problem
     except InputError as problem:  # raised by a validator with its own words
         raise error(where, str(problem)) from problem
@@ -97,6 +97,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
             return f"{key}: found {shown(value)}, expected a list in brackets"
         case "too_short":
             return f"{key}: found {shown(value)}, expected {first['ctx']['min_length']} or more in it"
+        case "too_long":
+            return f"{key}: found {shown(value)}, expected {first['ctx']['max_length']} or fewer in it"
         case "string_too_short":
             return f"{key}: found {shown(value)}, expected a text that is not empty"
         case "int_type" | "int_from_float":
@@ -114,22 +116,21 @@ def _known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
     """Keys of the (nested) table at that path."""
     table: type[Any] = model
     for part in path:
-        fields: dict[str, Any] = getattr(table, "model_fields", {})
-        info = fields.get(str(part)) or next(
-            (field for field in fields.values() if field.alias == part), None
-        )
-        inner = None if info is None else _table_in(info.annotation)
-        if inner is None:
-            # a table of tables keyed by the user's own names: the model is one level up
-            continue
-        table = inner
+        # else a table of tables keyed by the user's own names: the model is one level up
+        table = settings_in(_annotations(table).get(str(part))) or table
+    return list(_annotations(table))
+
+
+def _annotations(table: type[Any]) -> dict[str, Any]:
+    """Keys of a model or of settings, and their types."""
     if is_dataclass(table):
-        return [key.name or field.name for field, key in keys_of(table)]
-    return [field.alias or name for name, field in table.model_fields.items()]
+        hints = get_type_hints(table)
+        return {key.name or field.name: hints[field.name] for field, key in keys_of(table)}
+    return {field.alias or name: field.annotation for name, field in table.model_fields.items()}
 
 
-def _table_in(annotation: Any) -> type[Any] | None:
-    """The model or settings inside an annotation such as ``Model | None`` or ``dict[str, Model]``."""
+def settings_in(annotation: Any) -> type[Any] | None:
+    """The model or settings inside a type such as ``Model | None`` or ``dict[str, Model]``."""
     if isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation)):
         return annotation
-    return next((table for part in get_args(annotation) if (table := _table_in(part))), None)
+    return next((table for part in get_args(annotation) if (table := settings_in(part))), None)

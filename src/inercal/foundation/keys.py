@@ -1,7 +1,8 @@
 """Keys of a study, written once with the field of settings: name, unit, default, bounds and meaning.
 
-A field of a settings dataclass is made by `quantity`, `quantities` or `option`; from it follow the reading of the key
-(`inercal.faces.studies.tables`), its JSON Schema, its line in the reference and in the study that `inercal new` writes.
+A field of a settings dataclass is made by `quantity`, `quantities`, `option` or `table`; from it follow the reading of
+the key (`inercal.faces.studies.tables`), its JSON Schema, its line in the reference and in the study that `inercal new`
+writes. Settings refuse in ``__post_init__``, by an `InputError` that names the key, what cannot stand together.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from inercal.foundation.units import parse_quantity
 
@@ -21,6 +22,9 @@ class Bounds:
     accept: Callable[[float], bool]
     words: str
 
+
+OUTPUT = "output"
+"""Dimension of a quantity in the unit of an instrument's outputs: it stays a text until that is known."""
 
 ANYTHING = Bounds(lambda value: True, "")
 
@@ -41,6 +45,15 @@ RATE = above_zero("a rate")
 DEVIATION = above_zero("a standard deviation")
 PART = Bounds(lambda part: 0.0 <= part < 1.0, "a part from 0 to below 1")
 RELATIVE_U = Bounds(lambda u: 0.0 <= u < 1.0, "0 or more, and below 1")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The reading of an entry that is no plain value: ``parse`` raises `InputError` for what it is not, and
+    ``schema`` is its JSON Schema."""
+
+    parse: Callable[[Any], Any]
+    schema: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -66,8 +79,24 @@ class Key:
         Field of the same settings that takes the standard uncertainty of the quantity.
     several : bool
         A list of quantities.
+    exact, uncertain : bool
+        A quantity that is refused with an uncertainty, and one that is refused without.
     least, most : float or None
         Bounds of a plain number; ``least`` of a list is its length.
+    words : mapping
+        Words that may stand in place of a quantity, and the value of the field that each is.
+    of : str
+        What the quantities of a list are for, parted by commas, where it has so many: "x, y, z".
+    one : bool
+        A single quantity may stand for all of such a list.
+    table : bool
+        The field is settings itself, a tuple of them, or a mapping of them by names of one's own.
+    kinds : tuple of str
+        Kinds, or methods, that heed the key; all where it is empty.
+    needed : tuple of str
+        Those of them that cannot do without it.
+    reads : Reading or None
+        Of an entry that is neither a quantity nor a plain value.
     """
 
     says: str
@@ -78,8 +107,42 @@ class Key:
     name: str = ""
     u: str = ""
     several: bool = False
+    exact: bool = False
+    uncertain: bool = False
     least: float | None = None
     most: float | None = None
+    words: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    of: str = ""
+    one: bool = False
+    table: bool = False
+    kinds: tuple[str, ...] = ()
+    needed: tuple[str, ...] = ()
+    reads: Reading | None = None
+
+    @property
+    def default_value(self) -> Any:
+        """The value of the field [SI] that ``default`` stands for."""
+        if self.default in self.words:
+            return self.words[self.default]
+        return parse_quantity(self.default, self.dimension, self.says).value
+
+
+class More(TypedDict, total=False):
+    """Further attributes of a `Key`."""
+
+    bounds: Bounds
+    name: str
+    u: str
+    exact: bool
+    uncertain: bool
+    least: float | None
+    most: float | None
+    words: Mapping[str, Any]
+    of: str
+    one: bool
+    kinds: tuple[str, ...]
+    needed: tuple[str, ...]
+    reads: Reading
 
 
 REQUIRED: Any = dataclasses.MISSING
@@ -87,23 +150,18 @@ REQUIRED: Any = dataclasses.MISSING
 
 
 def quantity(
-    says: str,
-    dimension: str,
-    default: Any = None,
-    *,
-    example: str = "",
-    bounds: Bounds = ANYTHING,
-    name: str = "",
-    u: str = "",
+    says: str, dimension: str, default: Any = None, *, example: object = None, **more: Unpack[More]
 ) -> Any:
-    """A field that a study states as a text with a unit.
+    """A field that a study states as a text with a unit; as several by their names, where it is a mapping.
 
-    ``default`` is such a text, or the value [SI] of an absent key where there is no text for it, or `REQUIRED`; the
-    other parameters are those of `Key`.
+    ``default`` is such a text or word, or the value [SI] of an absent key where there is no text for it, or `REQUIRED`;
+    ``example`` and ``more`` are those of `Key`.
     """
     text = default if isinstance(default, str) else ""
-    value = parse_quantity(text, dimension, says).value if text else default
-    key = Key(says, dimension, text, example or text, bounds, name, u)
+    key = Key(says, dimension, text, example or text, **more)
+    value = key.default_value if text else default
+    if isinstance(value, Mapping):
+        return dataclasses.field(default_factory=dict, metadata={"key": key})
     return dataclasses.field(default=value, metadata={"key": key})
 
 
@@ -115,17 +173,21 @@ def quantities(
     return dataclasses.field(default=(), metadata={"key": key})
 
 
-def option(
-    says: str,
-    default: Any = REQUIRED,
-    *,
-    example: object = None,
-    name: str = "",
-    least: float | None = None,
-    most: float | None = None,
-) -> Any:
-    """A field that a study states as a plain value: a word, a number, true or false, or a file."""
-    key = Key(says, example=example, name=name, least=least, most=most)
+def option(says: str, default: Any = REQUIRED, *, example: object = None, **more: Unpack[More]) -> Any:
+    """A field that a study states as a plain value: a word, a number, true or false, a file, or a list of these."""
+    key = Key(says, example=example, **more)
+    return dataclasses.field(default=default, metadata={"key": key})
+
+
+def table(says: str, default: Any = REQUIRED, *, example: object = None, name: str = "") -> Any:
+    """A field that a study states as a table, or as a list or table of tables: its type is a settings dataclass,
+    ``Settings | None``, ``tuple[Settings, ...]`` or ``Mapping[str, Settings]``.
+
+    Keys that are absent there are those of the ``default``.
+    """
+    key = Key(says, example=example, name=name, table=True)
+    if isinstance(default, Mapping):
+        return dataclasses.field(default_factory=dict, metadata={"key": key})
     return dataclasses.field(default=default, metadata={"key": key})
 
 
@@ -134,6 +196,12 @@ def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:
     for each in dataclasses.fields(settings):
         if key := each.metadata.get("key"):
             yield each, key
+
+
+def unheeded(settings: type, kind: str) -> dict[str, tuple[str, ...]]:
+    """Keys of a table that some ``kind`` does not heed, each with the kinds that do."""
+    limited = {key.name or field.name: key.kinds for field, key in keys_of(settings) if key.kinds}
+    return {name: kinds for name, kinds in limited.items() if kind not in kinds}
 
 
 GONE: Mapping[tuple[str, str], str] = {

@@ -75,6 +75,7 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         {"m/s^2/sqrt(s)": 1.0, "m/s^2/sqrt(h)": 1 / 60, "ug/sqrt(s)": 1e-6 * _G, "ug/sqrt(h)": 1e-6 * _G / 60,
          "mg/sqrt(h)": 1e-3 * _G / 60},
     ),
+    "snap density": ("rad^2/s^7", {"rad^2/s^7": 1.0}),
     "quadratic": ("s^2/m", {"s^2/m": 1.0, "ug/g^2": 1e-6 / _G, "mg/g^2": 1e-3 / _G}),
     "rate by force": (
         "rad*s/m",

@@ -19,7 +19,7 @@ from inercal.systems.aoa.fusion.live_band import LimitedState
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.from_record import at_range, check_axes, check_unit, indication, of_sensors
 from inercal.systems.aoa.result.columns import beyond
-from inercal.systems.aoa.settings import GYROS, AoaSettings, Resonance
+from inercal.systems.aoa.settings import GYROS, AoaSettings, Heave, Resonance
 
 
 class Sensors:
@@ -156,10 +156,9 @@ def choice_of(settings: AoaSettings, final: bool) -> Array:
 def chosen(settings: AoaSettings, choice: Array) -> AoaSettings:
     """The study with what was decided."""
     _, rate, low, snap, about, rest, scale, *numbers = choice.tolist()
-    heave, axial = (
-        Resonance(frequency, damping, level, bool(vertical))
-        for frequency, damping, level, vertical in (numbers[:4], numbers[4:8])
-    )
+    frequency, damping, level, vertical = numbers[:4]
+    heave = Heave(frequency, damping, level, "vertical" if vertical else "z")
+    axial = Resonance(*numbers[4:7])
     rectified, *notch = numbers[8:]
     prior = replace(
         settings.prior, gyro_delay=rest, gyro_scale=scale, rectified=rectified, heave=heave, axial=axial

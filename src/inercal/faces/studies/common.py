@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import datetime
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler
+from pydantic_core import core_schema
 
 from inercal.faces.studies.fields import QuantityText, Temperature
+from inercal.faces.studies.laboratory import Equipment, ItemTable, LaboratoryTable, Tolerances, traced
+from inercal.faces.studies.tables import as_typed
 from inercal.foundation._toml import Strict
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import GravityInput, Site, gravity, gravity_gradient
 from inercal.foundation.units import Quantity
+from inercal.systems.listed import SYSTEMS
 
 GRAVITY_ANOMALY = 3.5e-4
 """Standard uncertainty of normal gravity [m/s²]: rms free-air anomaly, about 35 mGal."""
@@ -82,15 +87,62 @@ class ConditionsTable(Strict):
     humidity: Humidity | None = Field(default=None, description="relative humidity of the air")
 
 
-# Keys of every kind of study, at its beginning and its end.
+class StudyFile(Strict):
+    """Keys of every kind of study; a kind has its own tables between them."""
 
-Version = Annotated[Literal[1], Field(alias="schema", description="version of the study format")]
-Traceability = Annotated[
-    TraceabilityTable, Field(title="Traceability", description="free texts that go with the result")
-]
-Conditions = Annotated[
-    ConditionsTable, Field(title="Conditions", description="conditions during the recording")
-]
+    version: Literal[1] = Field(default=1, alias="schema", description="version of the study format")
+    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
+    item: ItemTable = Field(
+        default=ItemTable(),
+        title="Item",
+        description="the instrument, as a store and a certificate name it",
+    )
+    laboratory: LaboratoryTable = Field(
+        default=LaboratoryTable(),
+        title="Laboratory",
+        description="who calibrates, ahead of what lab.toml says",
+    )
+    equipment: Equipment
+    specification: Tolerances
+    traceability: TraceabilityTable = Field(
+        default=TraceabilityTable(), title="Traceability", description="free texts that go with the result"
+    )
+    conditions: ConditionsTable = Field(
+        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
+    )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The schema in the order in which people read a study: instrument, test, certificate."""
+        made = handler.resolve_ref_schema(handler(schema))
+        keys, last = made["properties"], list(StudyFile.model_fields)[2:]
+        first = [key for key in _FIRST if key in keys]
+        middle = [key for key in keys if key not in (*first, *last)]
+        made["properties"] = {key: keys[key] for key in (*first, *middle, *last)}
+        return made
+
+    def shared(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Fields that the settings of all systems have; ``data`` is the study as parsed."""
+        return {
+            "traceability": traced(self.traceability.model_dump(), self.item),
+            "temperature": self.conditions.temperature,
+            "given": as_typed(data),
+        }
+
+
+#: tables at the begin of a study
+_FIRST = (
+    "schema",
+    "site",
+    "rig",
+    "records",
+    "sensors",
+    "positions",
+    *(system.table for system in SYSTEMS.values()),
+    "noise",
+)
 
 
 def site_of(table: SiteTable, where: object) -> Site:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -49,28 +49,46 @@ class AsTyped:
 
 
 @dataclass(frozen=True)
+class Word:
+    """A word that was typed in place of a quantity, and the ``value`` of the field that it stands for."""
+
+    value: Any
+    typed: str
+
+
+@dataclass(frozen=True)
 class QuantityText(AsTyped):
     """Makes a pydantic field read a quantity from its text: ``Annotated[Quantity, QuantityText("time")]``.
 
     ``dimension`` is a key of the unit table, ``example`` a good value for the JSON Schema, ``accepts`` true for a value
-    [SI] that makes sense, and ``expected`` the same in words, for the error message: "a time above zero".
+    [SI] that makes sense, and ``expected`` the same in words, for the error message: "a time above zero". ``words`` may
+    stand in its place; ``uncertain``: it needs an uncertainty.
     """
 
     dimension: str
     example: str
     accepts: Callable[[float], bool] = anything
     expected: str = ""
+    words: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    uncertain: bool = False
 
-    def parse(self, text: object) -> Quantity:
-        """Read one value; refusals go to pydantic, which knows the key."""
+    def parse(self, text: object) -> Any:
+        """Read one quantity, or `Word`; refusals go to pydantic, which knows the key."""
+        if isinstance(text, str) and text in self.words:
+            return Word(self.words[text], text)
+        words = "".join(f", or {word}" for word in self.words)
         try:
             quantity = parse_quantity(text, self.dimension, "quantity", self.example)
         except QuantityError as error:
-            raise refusal(error.message) from error
+            raise refusal(f"{error.message}{words}") from error
+        if self.uncertain and quantity.u == 0.0:
+            raise refusal(
+                f"found {shown(text)}, expected it with its standard uncertainty, such as {self.example!r}"
+            )
         if self.accepts(quantity.value):
             return quantity
         si = "" if quantity.unit.symbol == quantity.unit.si else f", that is {_in_si(quantity)}"
-        raise refusal(f"found {shown(text)}{si}, expected {self.expected}")
+        raise refusal(f"found {shown(text)}{si}, expected {self.expected}{words}")
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -78,11 +96,13 @@ class QuantityText(AsTyped):
         """A text of that shape; a bare number too where no unit is needed."""
         bare = self.dimension == "number"
         unit = rf"({_UNIT}|\s*1)?" if bare else _UNIT
-        return {
+        quantity = {
             "type": ["string", "number"] if bare else "string",
             "pattern": rf"{_VALUE}{_PLUS_MINUS}{unit}\s*$",
             "examples": [self.example],
         }
+        words = [{"const": word, "type": "string"} for word in self.words]
+        return {"anyOf": [quantity, *words]} if words else quantity
 
 
 @dataclass(frozen=True)
@@ -96,6 +116,11 @@ class Several:
     def values(self) -> tuple[float, ...]:
         """In SI."""
         return tuple(quantity.value for quantity in self.quantities)
+
+    @property
+    def u(self) -> tuple[float, ...]:
+        """Their standard uncertainties, in SI."""
+        return tuple(quantity.u for quantity in self.quantities)
 
 
 @dataclass(frozen=True)
@@ -130,9 +155,10 @@ class SeveralTexts(AsTyped):
         return {"anyOf": [each, several]} if self.one else several
 
 
-def refusal(message: str) -> PydanticCustomError:
-    """An error that `inercal.foundation._toml.check` reports in just these words, after the dotted key."""
-    return PydanticCustomError("refused", "refused", {"error": InputError("key", message)})
+def refusal(message: str, key: str = "") -> PydanticCustomError:
+    """An error that `inercal.foundation._toml.check` reports in just these words, after the dotted key; ``key`` is one
+    of the table that is refused."""
+    return PydanticCustomError("refused", "refused", {"error": InputError(key, message)})
 
 
 def _in_si(quantity: Quantity) -> str:
@@ -247,9 +273,10 @@ class SlopeText(AsTyped):
 class ExactText(QuantityText):
     """A quantity whose uncertainty is stated elsewhere: one beside it is refused."""
 
-    def parse(self, text: object) -> Quantity:
+    def parse(self, text: object) -> Any:
         """Read one value."""
-        return exact(super().parse(text))
+        quantity = super().parse(text)
+        return quantity if isinstance(quantity, Word) else exact(quantity)
 
 
 def exact(quantity: Quantity) -> Quantity:

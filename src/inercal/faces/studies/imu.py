@@ -9,29 +9,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from inercal.faces.studies.common import (
-    Conditions,
-    ConditionsTable,
-    SiteTable,
-    Traceability,
-    TraceabilityTable,
-    Version,
-    site_of,
-)
+from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.laboratory import (
-    Equipment,
-    Item,
-    ItemTable,
-    Laboratory,
-    LaboratoryTable,
-    Tolerances,
-    traced,
-)
 from inercal.faces.studies.rig import RigTable, chain_of
-from inercal.faces.studies.tables import as_typed, settings_of, table_of
+from inercal.faces.studies.tables import check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -101,14 +84,10 @@ def aided_settings(table: AidedTable, where: object) -> AidedSettings:
     return AidedSettings(chain, None if azimuth is None else azimuth.u)
 
 
-#: keys that not all methods heed -> those that do
+#: keys beside those of the settings that not all methods heed -> those that do
 _METHODS = {
-    "static_start": ("multiposition",),
-    "g_sensitivity": ("multiposition", "aided"),
-    "bias_drift": ("multiposition",),
     "exclude": ("multiposition", "means", "known_rates"),
     "k2": ("multiposition", "ferraris", "means", "aided"),
-    "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
     "alignment": ("known_turns",),
@@ -204,24 +183,14 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         """Refuse what the method does not heed."""
         for key in ("rates", "turns"):
             if self.method == f"known_{key}" and not getattr(self, key):
-                raise refusal(f"{key}: missing, expected it with method = {self.method!r}")
+                raise refusal(f"missing, expected it with method = {self.method!r}", key)
+        check_kind(ImuSettings, self, self.method, "method")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
-                raise refusal(
-                    f"{key}: found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
-                )
+                words = f"found with method = {self.method!r}, expected it with {' or '.join(methods)} only"
+                raise refusal(words, key)
         return self
-
-
-#: keys of simulations that not all methods heed -> those that do
-_SIMULATED = {
-    "poses": ("multiposition",),
-    "start": ("multiposition", "aided"),
-    "restless_start": ("multiposition", "ferraris"),
-    "lever_arm": ("aided",),
-    "delay": ("aided",),
-}
 
 
 class ImuDisturbancesTable(table_of(Disturbances)):  # type: ignore[misc]
@@ -242,11 +211,9 @@ class SimulationTable(table_of(Simulation)):  # type: ignore[misc]
     )
 
 
-class ImuStudyFile(Strict):
+class ImuStudyFile(StudyFile):
     """A study for ``inercal calibrate imu``."""
 
-    version: Version = 1
-    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the instrument stands")
     imu: ImuTable = Field(default=ImuTable(), title="Imu", description="how to calibrate the IMU")
     simulation: SimulationTable = Field(
         default=SimulationTable(), title="Simulation", description="a simulated recording"
@@ -256,24 +223,12 @@ class ImuStudyFile(Strict):
         title="Disturbances",
         description="what a simulation adds to the model",
     )
-    item: Item = ItemTable()
-    laboratory: Laboratory = LaboratoryTable()
-    equipment: Equipment
-    specification: Tolerances
-    traceability: Traceability = TraceabilityTable()
-    conditions: Conditions = ConditionsTable()
 
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuStudyFile:
         """Refuse what the simulation of the method does not heed."""
-        for table, given in (("simulation", self.simulation), ("disturbances", self.disturbances)):
-            for key in sorted(given.model_fields_set):
-                methods = _SIMULATED.get(key, ())
-                if methods and self.imu.method not in methods:
-                    raise refusal(
-                        f"{table}.{key}: found with method = {self.imu.method!r}, expected it with "
-                        f"{' or '.join(methods)} only"
-                    )
+        check_kind(Simulation, self.simulation, self.imu.method, "method", "simulation.")
+        check_kind(Disturbances, self.disturbances, self.imu.method, "method", "disturbances.")
         return self
 
 
@@ -351,9 +306,7 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),
-        traceability=traced(file.traceability.model_dump(), file.item),
         method=_method(file.imu, path),
-        temperature=file.conditions.temperature,
         exclude=exclusion_of(file.imu.exclude),
-        given=as_typed(data),
+        **file.shared(data),
     )

@@ -84,12 +84,6 @@ class EquipmentTable(Strict):
     )
 
 
-Item = Annotated[
-    ItemTable, Field(title="Item", description="the instrument, as a store and a certificate name it")
-]
-Laboratory = Annotated[
-    LaboratoryTable, Field(title="Laboratory", description="who calibrates, ahead of what lab.toml says")
-]
 Equipment = Annotated[
     dict[str, EquipmentTable],
     Field(

@@ -7,11 +7,12 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from inercal.faces.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
 from inercal.foundation._toml import read_toml
 from inercal.foundation.errors import StudyError
+from inercal.foundation.keys import unheeded
 from inercal.foundation.units import shown
 from inercal.systems.aoa.system import SYSTEM as AOA
 from inercal.systems.contract import System
@@ -195,7 +196,8 @@ def put(data: dict[str, Any], override: str, folder: Path) -> None:
         ]  # where the latitude is needed for earth rate too, it is missed with that reason
     value = _value(text.strip())
     if keys == ["motion", "kind"]:
-        _make_room_for_motion(table, value)
+        for other in _of_other_motions(value):
+            table.pop(other, None)
     is_file = re.fullmatch(_FILES, ".".join(keys)) and isinstance(value, str)
     # typed on a command line, and so beside where one is; what a study names lies beside the study
     table[keys[-1]] = os.path.relpath(value, folder) if is_file and value else value
@@ -210,12 +212,11 @@ def _make_room(table: dict[str, Any], name: str, key: str) -> None:
                     table.pop(other, None)
 
 
-def _make_room_for_motion(table: dict[str, Any], kind: object) -> None:
-    """Take out of the motion of a study what belongs to other kinds alone."""
-    from inercal.faces.studies.motion import of_other_kinds
+def _of_other_motions(kind: object) -> Iterable[str]:
+    """Keys of a motion that belong to other kinds alone."""
+    from inercal.systems.aoa.motion import MotionKind, MotionPlan
 
-    for key in of_other_kinds(kind):
-        table.pop(key, None)
+    return unheeded(MotionPlan, str(kind)) if kind in get_args(MotionKind) else ()
 
 
 def _value(text: str) -> Any:

@@ -30,9 +30,6 @@ from inercal.systems.selfcal.settings import PlatformStates
 
 _KINDS = tuple(kind for kind, state in STATES.items() if state.key and kind != "harmonics")
 
-LEFT_OUT = (*_KINDS, "harmonics")
-"""Kinds of errors of the rig that a study may leave out of the states."""
-
 #: key of a study -> parameters that it states
 _DELAYS = {"delay_encoder": ("tau_enc",), "delay_accelerometer": ("tau_a",)}
 

@@ -9,59 +9,25 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StrictInt, create_model, field_validator
+from pydantic import Field, create_model, field_validator
 
-from inercal.faces.studies.common import (
-    Conditions,
-    ConditionsTable,
-    SiteTable,
-    Traceability,
-    TraceabilityTable,
-    Version,
-    site_on_earth,
-)
-from inercal.faces.studies.fields import QuantityText, Several, SeveralTexts, positive, refusal
-from inercal.faces.studies.laboratory import (
-    Equipment,
-    Item,
-    ItemTable,
-    Laboratory,
-    LaboratoryTable,
-    Tolerances,
-    traced,
-)
-from inercal.faces.studies.platform import (
-    CommandTable,
-    GimbalsTable,
-    PlacedRecordTable,
-    base_of,
-    fixed_of,
-    gimbals_of,
-    joints_of,
-    limits_of,
-    plan_of,
-)
-from inercal.faces.studies.platform_model import LEFT_OUT, ModelTable, model_of, on_rig, true_errors
-from inercal.faces.studies.rig import Angle
-from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
+from inercal.faces.studies.common import SiteTable, StudyFile, site_on_earth
+from inercal.faces.studies.fields import QuantityText, Several, SeveralTexts, Word, positive, refusal
+from inercal.faces.studies.platform import CommandTable, GimbalsTable, PlacedRecordTable, plan_of
+from inercal.faces.studies.platform_model import ModelTable, model_of, on_rig, true_errors
+from inercal.faces.studies.tables import replaced, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import Site
-from inercal.foundation.units import Quantity, parse_quantity
+from inercal.foundation.units import parse_quantity
+from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.estimators import GONE
 from inercal.systems.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
-from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.platform.joint_limits import JointLimits
+from inercal.systems.selfcal.platform.rig import Base, Gimbals
 from inercal.systems.selfcal.platform.states import STATES
-from inercal.systems.selfcal.settings import (
-    Disturbances,
-    Filter,
-    Gating,
-    Noise,
-    RecordOnBase,
-    Search,
-    SelfcalSettings,
-)
+from inercal.systems.selfcal.settings import Filter, Gating, RecordOnBase, SelfcalSettings
 
 
 def _small(group: str) -> QuantityText:
@@ -143,61 +109,16 @@ class FilterTable(table_of(Filter)):  # type: ignore[misc]
     )
 
 
-class SearchTable(table_of(Search)):  # type: ignore[misc]
-    """The search for a path."""
-
-    robust: list[Literal[LEFT_OUT]] = Field(  # type: ignore[valid-type]
-        default=[],
-        description="errors that are no states, of the size stated under model, or usual: how far they shift "
-        "coefficients counts beside the bound",
-        examples=[["k2", "harmonics"]],
-    )
-
-
-class EncoderHarmonicTable(Strict):
-    """An error of an encoder that repeats with its angle: amplitude times sin(order times angle + phase)."""
-
-    axis: Literal["x", "y", "z"] = Field(description="the joint")
-    order: Annotated[StrictInt, Field(ge=1, le=100_000)] = Field(description="periods in a full turn")
-    amplitude: Annotated[Quantity, QuantityText("angle", "5 arcsec")] = Field(description="of the error")
-    phase: Angle | None = Field(default=None, description="at angle 0; 0 if absent")
-
-
-class SwayTable(Strict):
-    """Sway of the base about two level axes, a quarter of a period apart."""
-
-    amplitude: Annotated[Quantity, QuantityText("angle", "2 arcsec", positive, "an angle above zero")] = (
-        Field(description="about each axis")
-    )
-    frequency: Annotated[
-        Quantity, QuantityText("frequency", "0.3 Hz", positive, "a frequency above zero")
-    ] = Field(description="of both")
-
-
 _ON_RIG: Any = create_model("OnRig", __base__=table_of(Disturbances), **true_errors())
 
 
 class DisturbancesTable(_ON_RIG):  # type: ignore[misc]
     """Disturbances that a simulation adds to the model; none if absent."""
 
-    harmonics: list[EncoderHarmonicTable] = Field(
-        default=[],
-        description="errors of the encoders; none if absent",
-        examples=[[{"axis": "z", "order": 2, "amplitude": "5 arcsec", "phase": "0 deg"}]],
-    )
-    base_sway: SwayTable | None = Field(
-        default=None,
-        title="Base sway",
-        description="sway of the base; none if absent",
-        examples=[{"amplitude": "2 arcsec", "frequency": "0.3 Hz"}],
-    )
 
-
-class SelfcalStudyFile(Strict):
+class SelfcalStudyFile(table_of(SelfcalSettings), StudyFile):  # type: ignore[misc]
     """A study of a self-calibration, for `inercal simulate selfcal`, `design selfcal` and `selfcal`."""
 
-    version: Version = 1
-    site: SiteTable = Field(default=SiteTable(), title="Site", description="where the platform stands")
     rig: GimbalsTable = Field(title="Rig", description="the gimbals and their base")
     records: list[PlacedRecordTable] = Field(
         default=[],
@@ -214,7 +135,6 @@ class SelfcalStudyFile(Strict):
     model: ModelTable = Field(
         default=ModelTable(), title="Model", description="errors of the rig, estimated or stated"
     )
-    noise: Stated[Noise] = Field(title="Noise", description="noise of the instruments")
     prior: PriorTable = Field(
         default=PriorTable(), title="Prior", description="what is known before the test"
     )
@@ -223,13 +143,6 @@ class SelfcalStudyFile(Strict):
     disturbances: DisturbancesTable = Field(
         default=DisturbancesTable(), title="Disturbances", description="what a simulation adds to the model"
     )
-    design: SearchTable = Field(default=SearchTable(), title="Design", description="the search for a path")
-    item: Item = ItemTable()
-    laboratory: Laboratory = LaboratoryTable()
-    equipment: Equipment
-    specification: Tolerances
-    traceability: Traceability = TraceabilityTable()
-    conditions: Conditions = ConditionsTable()
 
 
 def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
@@ -237,38 +150,40 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
 
     ``path`` is where it came from; files that the study names lie beside it.
     """
-    file = check(SelfcalStudyFile, data, path, StudyError)
-    base, limits, fixed = base_of(file.rig), limits_of(file.rig, path), fixed_of(file.rig, path)
-    joints = joints_of(file.rig, path)
-    return SelfcalSettings(
+    file: Any = check(SelfcalStudyFile, data, path, StudyError)
+    base, fixed, joints = (
+        settings_of(Base, file.rig),
+        file.rig.fixed.by_joint,
+        settings_of(JointLimits, file.rig),
+    )
+    truth = None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances))
+    return settings_of(
+        SelfcalSettings,
+        file,
         site=_site(file.site, path),
-        noise=file.noise,
         prior=_prior(file.prior, base),
-        gimbals=gimbals_of(file.rig),
+        gimbals=settings_of(Gimbals, file.rig),
         base=base,
-        heading_unknown=file.rig.heading == "unknown",
-        limits=limits,
+        heading_unknown=isinstance(file.rig.heading, Word),
+        limits=file.rig.limits.by_joint,
         joints=joints,
         fixed=fixed,
         plan=None if file.plan is None else plan_of(file.plan, fixed, joints, path),
-        truth=None if file.truth is None else np.append(_truth(file.truth), on_rig(file.disturbances)),
+        truth=truth,
         goal=_wanted(file.goal),
         filter=_filter(file.filter),
         model=model_of(file.model, file.filter, path),
-        disturbances=_disturbances(file.disturbances),
-        search=settings_of(Search, file.design, robust=tuple(file.design.robust)),
-        placed=tuple(_placed(each, file) for each in file.records),
-        traceability=traced(file.traceability.model_dump(), file.item),
-        temperature=file.conditions.temperature,
-        given=as_typed(data),
+        disturbances=settings_of(Disturbances, file.disturbances),
+        placed=tuple(_placed(record, file) for record in file.records),
+        **file.shared(data),
     )
 
 
-def _placed(table: PlacedRecordTable, file: SelfcalStudyFile) -> RecordOnBase:
+def _placed(table: PlacedRecordTable, file: Any) -> RecordOnBase:
     """A record with its base."""
-    base = base_of(file.rig, table)
-    typed = file.rig.heading if table.heading is None else table.heading
-    return RecordOnBase(table.file, base, typed == "unknown", _prior(file.prior, base))
+    base = replaced(settings_of(Base, file.rig), table)
+    typed = table.heading or file.rig.heading
+    return RecordOnBase(table.file, base, isinstance(typed, Word), _prior(file.prior, base))
 
 
 def _site(table: SiteTable, path: str | Path) -> Site:
@@ -319,22 +234,3 @@ def _filter(table: Any) -> Filter:
     """The estimator."""
     gating = None if table.gating == "off" else Gating(table.gating, table.gating_stops)
     return settings_of(Filter, table, gating=gating)
-
-
-def _disturbances(table: Any) -> Disturbances:
-    """Disturbances of a simulation."""
-    sway = table.base_sway
-    return settings_of(
-        Disturbances,
-        table,
-        base_sway=(0.0, 0.0) if sway is None else (sway.amplitude.value, sway.frequency.value),
-        harmonics=tuple(
-            (
-                "xyz".index(each.axis),
-                each.order,
-                each.amplitude.value,
-                0.0 if each.phase is None else each.phase.value,
-            )
-            for each in table.harmonics
-        ),
-    )

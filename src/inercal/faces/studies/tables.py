@@ -2,67 +2,108 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import functools
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from pydantic import Field, GetCoreSchemaHandler, create_model
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model
 from pydantic_core import core_schema
 
-from inercal.faces.studies.fields import QuantityText
-from inercal.foundation._toml import Strict
-from inercal.foundation.keys import Key, keys_of
+from inercal.faces.studies.fields import ExactText, QuantityText, Several, SeveralTexts, Word, refusal
+from inercal.foundation._toml import Strict, settings_in
+from inercal.foundation.errors import InputError
+from inercal.foundation.keys import OUTPUT, Key, Reading, keys_of, unheeded
 from inercal.foundation.units import Quantity
 
 T = TypeVar("T")
 
 
 @functools.cache
-def table_of(settings: type) -> Any:
-    """The pydantic model of a table whose keys are those of ``settings``; a base class for tables with more keys."""
+def table_of(settings: type, tables: bool | None = None) -> Any:
+    """The pydantic model of a table whose keys are those of ``settings``; a base class for tables with more keys.
+
+    ``tables``: of those keys the tables, or all but the tables.
+    """
     hints = get_type_hints(settings)
-    system = settings.__module__.split(".")[:2][-1].capitalize()
+    system = settings.__module__.split(".")[:3][-1].capitalize()
     fields: dict[str, Any] = {
         key.name or field.name: (
-            _quantity(key) if key.dimension else _plain(hints[field.name]),
-            _described(key, field.default),
+            _type(key, hints[field.name], field.default),
+            _described(key, field, hints[field.name]),
         )
         for field, key in keys_of(settings)
+        if tables in (None, key.table)
     }
     says = (settings.__doc__ or "").partition("\n\n")[0]
     return create_model(f"{system}{settings.__name__}", __base__=Strict, __doc__=says, **fields)
 
 
-def settings_of(settings: type[T], table: Any, **more: Any) -> T:
-    """The settings that a table states, and ``more`` of their fields; those of absent keys are as usual."""
+def settings_of(settings: type[T], *tables: Any, **more: Any) -> T:
+    """The settings that tables state, and ``more`` of their fields; those of absent keys are as usual."""
+    return settings(**_stated(settings, tables) | more)
+
+
+def replaced(usual: T, *tables: Any) -> T:
+    """The ``usual`` settings with what tables state."""
+    made: T = dataclasses.replace(cast(Any, usual), **_stated(type(usual), tables))
+    return made
+
+
+def _stated(settings: type, tables: Sequence[Any]) -> dict[str, Any]:
+    """Fields of settings whose keys stand in a table, and their values."""
     hints = get_type_hints(settings)
     values: dict[str, Any] = {}
     for field, key in keys_of(settings):
-        typed = getattr(table, key.name or field.name)
-        if key.several:
-            values[field.name] = tuple(each.value for each in typed or ())
-        elif isinstance(typed, Quantity) and "Quantity" not in str(hints[field.name]):
-            values[field.name] = typed.value
-            if key.u:
+        name = key.name or field.name
+        typed = next((getattr(table, name) for table in tables if name in table.model_fields_set), None)
+        if typed is not None:
+            values[field.name] = _value(typed, str(hints[field.name]))
+            if key.u and isinstance(typed, Quantity | Several):
                 values[key.u] = typed.u
-        elif typed is not None:
-            values[field.name] = Path(typed) if "Path" in str(hints[field.name]) else typed
-    return settings(**values | more)
+    return values
 
 
-@dataclass(frozen=True)
+def check_kind(settings: type, table: Strict, kind: str, word: str = "kind", at: str = "") -> None:
+    """Refuse keys of a table that a ``kind`` does not heed, and miss those that it needs; ``word`` is its key and
+    ``at`` begins the keys of the table, for errors."""
+    for name, kinds in unheeded(settings, kind).items():
+        if name in table.model_fields_set:
+            words = f"found with {word} = {kind!r}, expected it with {' or '.join(kinds)} only"
+            raise refusal(words, f"{at}{name}")
+    for field, key in keys_of(settings):
+        name = key.name or field.name
+        if kind in key.needed and name not in table.model_fields_set:
+            raise refusal(f"missing, expected it with {word} = {kind!r}", f"{at}{name}")
+
+
+@dataclass(frozen=True, eq=False)
 class _Reader:
-    """Lets a pydantic field hold settings: read as their table, built by `settings_of`."""
+    """Lets a pydantic field hold settings: read as their table, built by `settings_of`, with absent keys as ``usual``.
+
+    Keys of one kind alone are checked by the key ``kind`` beside them.
+    """
+
+    usual: Any = None
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Validate the table, then build."""
+
+        def built(table: Any) -> Any:
+            if "kind" in type(table).model_fields:
+                check_kind(source, table, table.kind)
+            try:
+                return settings_of(source, table) if self.usual is None else replaced(self.usual, table)
+            except InputError as error:
+                raise refusal(error.message, error.where) from error
+
         table = handler.generate_schema(table_of(source))
-        return core_schema.no_info_after_validator_function(functools.partial(settings_of, source), table)
+        return core_schema.no_info_after_validator_function(built, table)
 
 
 Stated = Annotated[T, _Reader()]
@@ -82,32 +123,102 @@ def as_typed(data: Mapping[str, Any]) -> dict[str, Any]:
     return {key: plain(value) for key, value in data.items()}
 
 
-def _quantity(key: Key) -> Any:
-    """The type of a quantity, or of a list of them."""
-    example = key.example[0] if isinstance(key.example, list) else key.example
-    one = Annotated[Quantity, QuantityText(key.dimension, str(example), key.bounds.accept, key.bounds.words)]
-    return list[one] if key.several else one
+@dataclass(frozen=True, eq=False)
+class _Parsed:
+    """Lets a pydantic field read an entry by its `Reading`."""
+
+    reading: Reading
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Parse; refusals go to pydantic, which knows the key."""
+
+        def parsed(typed: Any) -> Any:
+            try:
+                return self.reading.parse(typed)
+            except InputError as error:
+                raise refusal(error.message) from error
+
+        return core_schema.no_info_plain_validator_function(parsed)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """That of the reading."""
+        return dict(self.reading.schema)
+
+
+def _value(typed: Any, hint: str) -> Any:
+    """The value of a field that was typed: quantities in SI, lists as tuples, files as paths."""
+    match typed:
+        case Word():
+            return typed.value
+        case Several():
+            return typed.values
+        case Quantity():
+            return typed if "Quantity" in hint else typed.value
+        case list():
+            return tuple(_value(entry, hint) for entry in typed)
+        case dict():
+            return {name: _value(entry, hint) for name, entry in typed.items()}
+    return Path(typed) if "Path" in hint and isinstance(typed, str) else typed
+
+
+def _type(key: Key, hint: Any, default: Any) -> Any:
+    """The pydantic type of a key by that of its field: a list for a tuple, a table of one's own names for a mapping."""
+    one: Any
+    if key.table:
+        one = Annotated[settings_in(hint), _Reader(default if is_dataclass(default) else None)]
+    elif key.dimension == OUTPUT:
+        one = str
+    elif key.dimension:
+        text = ExactText if key.exact else QuantityText
+        example = key.example
+        while isinstance(example, list | dict):
+            example = example[0] if isinstance(example, list) else next(iter(example.values()))
+        bounds = key.bounds
+        read = text(key.dimension, str(example), bounds.accept, bounds.words, key.words, key.uncertain)
+        one = Annotated[Quantity, read]
+        if key.of:
+            one = Annotated[Several, SeveralTexts(read, key.of, one=key.one)]
+    elif key.reads:
+        one = Annotated[Any, _Parsed(key.reads)]
+    else:
+        return _plain(hint)
+    shape, several = get_origin(hint), get_args(hint)[-1:] == (Ellipsis,)
+    return list[one] if shape is tuple and several else dict[str, one] if shape is Mapping else one
 
 
 def _plain(hint: Any) -> Any:
-    """The type of a plain value as TOML has it: a file is a text."""
+    """The type of a plain value as TOML has it: a file is a text, a tuple of any length a list."""
     if "Path" in str(hint):
         return Annotated[str, Field(min_length=1)]
     if hint in (int, float, bool):
         return Annotated[hint, Field(strict=True)]
+    if get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis:
+        return list[_plain(get_args(hint)[0])]  # type: ignore[misc]
     return hint
 
 
-def _described(key: Key, default: Any) -> Any:
+def _described(key: Key, field: dataclasses.Field[Any], hint: Any) -> Any:
     """Meaning, default and bounds of a field; an absent quantity is None, the settings know what it stands for."""
-    absent = ... if default is MISSING else None if key.dimension else default
-    examples = None if key.example is None or (key.dimension and not key.several) else [key.example]
+    default = field.default if field.default_factory is MISSING else {}
+    plain = not (key.dimension or key.table)
+    listed = get_origin(hint) is tuple
+    absent = ... if default is MISSING else None if key.dimension else list(default) if listed else default
+    quantity = key.dimension not in ("", OUTPUT) and not (
+        listed or key.words or key.of or isinstance(default, dict)
+    )
+    title = (key.name or field.name).replace("_", " ").capitalize() if key.table and not listed else None
     return Field(
         default=absent,
+        title=title,
         description=key.says,
-        ge=None if key.several else key.least,
-        le=key.most,
-        min_length=int(key.least or 0) or None if key.several else None,
-        examples=examples,
+        ge=key.least if plain and not listed else None,
+        le=key.most if plain and not listed else None,
+        min_length=int(key.least or 0) or None if listed else None,
+        max_length=int(key.most or 0) or None if listed else None,
+        examples=None if key.example is None or quantity else [key.example],
         json_schema_extra={"default": key.default} if key.default else None,
     )

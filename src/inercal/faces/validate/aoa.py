@@ -16,9 +16,10 @@ from inercal.systems.aoa.angles import alpha_beta
 from inercal.systems.aoa.disturbances import Disturbances
 from inercal.systems.aoa.estimators import STATICS, Static
 from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.paper import lever, residuals, static
 from inercal.systems.aoa.paper.methods import measure as measure_by
-from inercal.systems.aoa.settings import AoaSettings, Attitude, Methods, MotionPlan, Noise
+from inercal.systems.aoa.settings import AoaSettings, Attitude, Methods, Noise
 from inercal.systems.aoa.simulate import simulate
 from inercal.systems.aoa.task import Measurement, measure
 

@@ -63,7 +63,7 @@ class ColumnEntry(Strict):
 
 def _refusal(message: str) -> PydanticCustomError:
     """An error that `inercal.foundation._toml.check` reports in just these words, after the dotted key."""
-    return PydanticCustomError("refused", "refused", {"error": InputError("key", message)})
+    return PydanticCustomError("refused", "refused", {"error": InputError("", message)})
 
 
 class FileEntry(Strict):

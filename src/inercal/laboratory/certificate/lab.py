@@ -11,14 +11,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from inercal.faces.studies.commented import commented
-from inercal.faces.studies.common import Conditions, ConditionsTable
+from inercal.faces.studies.common import ConditionsTable
 from inercal.faces.studies.fields import refusal
 from inercal.faces.studies.laboratory import (
     AddressTable,
     Day,
     Equipment,
     EquipmentTable,
-    Item,
     ItemTable,
     LaboratoryTable,
     Tolerances,
@@ -93,8 +92,12 @@ class LabFile(Strict):
     )
     customer: AddressTable = Field(default=AddressTable(), title="Customer", description="for whom")
     order: OrderTable = Field(default=OrderTable(), title="Order", description="the order, and its days")
-    item: Item = ItemTable()
-    conditions: Conditions = ConditionsTable()
+    item: ItemTable = Field(
+        default=ItemTable(), title="Item", description="the instrument, as a store and a certificate name it"
+    )
+    conditions: ConditionsTable = Field(
+        default=ConditionsTable(), title="Conditions", description="conditions during the recording"
+    )
     specification: Tolerances
     statements: StatementsTable = Field(
         default=StatementsTable(), title="Statements", description="statements of the laboratory"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.errors import InputError
 from inercal.foundation.keys import quantity, within
 
 _ANY_ANGLE = within(-math.pi, math.pi, "an angle from -180 deg to 180 deg")
@@ -23,6 +24,12 @@ class AlarmLimits:
     highest: float | None = quantity(
         "angle above which a row has an alarm; none if absent", "angle", example="25 deg", bounds=_ANY_ANGLE
     )
+
+    def __post_init__(self) -> None:
+        """Refuse limits between which there is nothing."""
+        if self.lowest is not None and self.highest is not None and not self.lowest < self.highest:
+            found = f"{math.degrees(self.lowest):g} deg with highest {math.degrees(self.highest):g} deg"
+            raise InputError("lowest", f"found {found}, expected it below")
 
     @property
     def stated(self) -> bool:

@@ -11,19 +11,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.keys import FREQUENCY, quantities, quantity
 from inercal.systems.aoa.limits import LIMITS
 
 
 @dataclass(frozen=True)
 class Band:
-    """Filter of all sensors alike before the fusion.
+    """The filter of all sensors before the fusion: causal, its delay known to the model; zero phase if smoothed.
 
-    ``low_pass`` [Hz], infinite for none, None where the recording decides (`inercal.systems.aoa.diagnosis.choice`);
-    ``notch`` [Hz] frequencies that are taken out; ``rate`` [Hz] of the rows it is for, 0 before there are any.
+    ``low_pass`` [Hz] is None where the recording decides (`inercal.systems.aoa.diagnosis.choice`); ``rate`` [Hz] of the
+    rows it is for, 0 before there are any.
     """
 
-    low_pass: float | None = None
-    notch: tuple[float, ...] = ()
+    low_pass: float | None = quantity(
+        "corner of the low pass; none; auto: none where the sensors fit each other, or the widest of 100 to 35 Hz "
+        "above twice the motion under which they do, and notches at lines of the spectrum", "frequency", "auto",
+        example="35 Hz", bounds=FREQUENCY, words={"auto": None, "none": math.inf},
+    )  # fmt: skip
+    notch: tuple[float, ...] = quantities(
+        "frequencies that are taken out", "frequency", example=["50 Hz"], bounds=FREQUENCY, at_least=0
+    )
     rate: float = 0.0
 
     @property

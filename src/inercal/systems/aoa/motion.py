@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from pathlib import Path
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError, StudyError
-from inercal.systems.aoa.disturbances import Oscillation, Shaking
-from inercal.systems.aoa.settings import MotionPlan
+from inercal.foundation.keys import FREQUENCY, TIME, option, quantity, within
+from inercal.systems.aoa.disturbances import SIZE, Oscillation, Shaking
 
+MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 Course: TypeAlias = Callable[[Array], tuple[Array, Array, Array]]
 """A value, its rate and its acceleration at times (n,) [s]."""
 
@@ -25,6 +27,88 @@ _SHAKING = 40
 
 _BLOCK = 64
 """Even times that are computed from one."""
+
+
+_PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
+_SINES = ("sine", "two-tone", "chirp")
+_RANDOM = ("pitch-pause", "chirp", "buffet")
+_STEPS = ("static", "pitch-pause")
+
+
+@dataclass(frozen=True)
+class MotionPlan:
+    """Pitch of the model in a simulation: its kind, and the keys of that kind.
+
+    ``static``: a sweep from ``first`` to ``last`` at a constant rate, over all of the duration. ``pitch-pause``: pauses
+    at ``first``, by ``step``, to ``last``, quintic moves between, and a buffet (its duration follows). ``sine``:
+    ``mean`` + ``amplitude`` sin 2 pi ``frequency`` t. ``two-tone``: with a second sine. ``chirp``: about ``mean``,
+    from ``low`` to ``high``. ``buffet``: about ``mean``, 150 equal sines of random frequency and phase from ``low`` to
+    ``high``, ``rms`` in all. ``file``: the columns t and theta_ref of ``path``, for ``duration`` at most.
+    """
+
+    kind: MotionKind = option(
+        "static: a sweep; pitch-pause: steps with pauses; sine; two-tone; chirp; buffet: random; file: as recorded"
+    )
+    duration: float = quantity(
+        "of all kinds but pitch-pause; of a file all if absent", "time", "60 s", bounds=TIME,
+        kinds=("static", *_SINES, "buffet", "file"),
+    )  # fmt: skip
+    sample_rate: float = quantity("samples per second", "frequency", "1 kHz", bounds=FREQUENCY)
+    mean: float = quantity(
+        "of sine, two-tone, chirp and buffet", "angle", "0 deg", example="30 deg", bounds=_PITCH,
+        kinds=(*_SINES, "buffet"),
+    )  # fmt: skip
+    amplitude: float = quantity(
+        "of sine, two-tone and chirp",
+        "angle",
+        0.0,
+        example="10 deg",
+        bounds=SIZE,
+        kinds=_SINES,
+        needed=_SINES,
+    )
+    frequency: float = quantity(
+        "of sine and two-tone", "frequency", 1.0, example="1 Hz", bounds=FREQUENCY,
+        kinds=_SINES[:2], needed=_SINES[:2],
+    )  # fmt: skip
+    second_amplitude: float = quantity(
+        "of the second sine of two-tone", "angle", 0.0, example="2 deg", bounds=SIZE,
+        kinds=("two-tone",), needed=("two-tone",),
+    )  # fmt: skip
+    second_frequency: float = quantity(
+        "of the second sine of two-tone", "frequency", 1.0, example="3 Hz", bounds=FREQUENCY,
+        kinds=("two-tone",), needed=("two-tone",),
+    )  # fmt: skip
+    low: float = quantity(
+        "lowest frequency of chirp, buffet and of the buffet in a pitch-pause", "frequency", 2.0,
+        example="0.1 Hz", bounds=FREQUENCY, kinds=_RANDOM, needed=_RANDOM[1:],
+    )  # fmt: skip
+    high: float = quantity(
+        "highest frequency of those", "frequency", 15.0, example="5 Hz", bounds=FREQUENCY,
+        kinds=_RANDOM, needed=_RANDOM[1:],
+    )  # fmt: skip
+    rms: float = quantity(
+        "of the buffet, in all; in a pitch-pause none if absent", "angle", 0.0, example="0.2 deg", bounds=SIZE,
+        kinds=("pitch-pause", "buffet"), needed=("buffet",),
+    )  # fmt: skip
+    first: float = quantity(
+        "angle at the start of static and pitch-pause", "angle", 0.0, example="-10 deg", bounds=_PITCH,
+        kinds=_STEPS, needed=_STEPS,
+    )  # fmt: skip
+    last: float = quantity(
+        "angle at the end of static and pitch-pause", "angle", 0.0, example="90 deg", bounds=_PITCH,
+        kinds=_STEPS, needed=_STEPS,
+    )  # fmt: skip
+    step: float = quantity(
+        "of pitch-pause, negative downward", "angle", 0.0, example="10 deg", bounds=_PITCH,
+        kinds=_STEPS[1:], needed=_STEPS[1:],
+    )  # fmt: skip
+    move: float = quantity("time of a move of pitch-pause", "time", "1.5 s", bounds=TIME, kinds=_STEPS[1:])
+    pause: float = quantity("time of a pause of pitch-pause", "time", "4 s", bounds=TIME, kinds=_STEPS[1:])
+    path: Path | None = option(
+        "of kind file: a record beside the study with the columns t and theta_ref", None, example="pitch.csv",
+        name="file", kinds=("file",), needed=("file",),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

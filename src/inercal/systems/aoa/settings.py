@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.errors import StudyError
+from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     DEVIATION,
@@ -19,21 +19,24 @@ from inercal.foundation.keys import (
     REQUIRED,
     TIME,
     Bounds,
+    above_zero,
     option,
     quantity,
+    table,
     within,
 )
 from inercal.foundation.units import STANDARD_GRAVITY, Quantity
 from inercal.systems.aoa.alarm import AlarmLimits
 from inercal.systems.aoa.band import Band
-from inercal.systems.aoa.disturbances import SIZE, Disturbances
+from inercal.systems.aoa.disturbances import DELAY, Disturbances
 from inercal.systems.aoa.estimators import WORDS, Centrifugal, EstimatorKind, States, Static, Tangential
 from inercal.systems.aoa.layout import Layout
 from inercal.systems.aoa.limits import LIMITS
+from inercal.systems.aoa.motion import MotionPlan
 
 Per = Literal["1", "V", "count"]
+Direction = Literal["z", "vertical"]
 PointsBy = Literal["auto", "point", "trigger", "pause"]
-MotionKind = Literal["static", "pitch-pause", "sine", "two-tone", "chirp", "buffet", "file"]
 
 GYROS = ("gyro", "gyro_roll", "gyro_yaw")
 
@@ -49,7 +52,8 @@ _OF_THE_STREAM = within(-0.25 * math.pi, 0.25 * math.pi, "an angle from -45 deg 
 _WALK = within(0.0, math.inf, "a random walk of 0 or more")
 _K2 = within(0.0, 0.1, "a coefficient from 0 to 0.1 s^2/m")
 _WAIT = within(0.0, 1e6, "a time of 0 or more")
-_PITCH = within(-2.0 * math.pi, 2.0 * math.pi, "an angle from -360 deg to 360 deg")
+_INSTANT = within(-1e10, 1e10, "a time of the record")
+_DAMPING = Bounds(lambda damping: 0.0 < damping < 1.0, "a relative damping above 0, below 1")
 
 
 @dataclass(frozen=True)
@@ -82,21 +86,52 @@ class Noise:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Flexure of the sting: a band-pass of ``frequency`` [rad/s] and relative ``damping``, whose output has the
-    standard deviation ``level`` [m/s^2]; along the body's axis, or ``vertical`` as of a support that plunges."""
+    """Flexure of the sting as the filter takes it: a band-pass with random input, along an axis of the body."""
 
-    frequency: float
-    damping: float
-    level: float
-    vertical: bool = False
+    frequency: float = quantity(
+        "of the resonance; as usual if absent", "frequency", 12.0, example="9 Hz", bounds=FREQUENCY
+    )
+    damping: float = quantity(
+        "relative to critical; as usual if absent", "number", 0.5, example="0.3", bounds=_DAMPING
+    )
+    level: float = quantity(
+        "standard deviation of the acceleration", "acceleration", "0.01 g", bounds=DEVIATION
+    )
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency [rad/s]."""
+        return 2.0 * math.pi * self.frequency
+
+    @property
+    def vertical(self) -> bool:
+        """True along the vertical, as of a support that plunges."""
+        return False
+
+
+@dataclass(frozen=True)
+class Heave(Resonance):
+    """The first of both resonances, across the model or along the vertical."""
+
+    frequency: float = quantity(
+        "of the resonance; as usual if absent", "frequency", 9.0, example="9 Hz", bounds=FREQUENCY
+    )
+    damping: float = quantity(
+        "relative to critical; as usual if absent", "number", 0.3, example="0.3", bounds=_DAMPING
+    )
+    direction: Direction = option("across the model, or vertical, as of a support that plunges", "z")
+
+    @property
+    def vertical(self) -> bool:
+        """True along the vertical, as of a support that plunges."""
+        return self.direction == "vertical"
 
 
 @dataclass(frozen=True)
 class Prior:
-    """Prior of the errors of the sensors: standard deviations about 0.
+    """Standard deviations of the sensors' errors about 0 before the run; the usual ones if absent.
 
-    ``heave`` and ``axial`` are the sting's flexure; ``rectified`` [m/s^2] is of the offset of each accelerometer by the
-    vibration of a recording.
+    ``rectified`` [m/s^2] is of the offset of each accelerometer by the vibration of a recording.
     """
 
     lever_common: float = quantity(
@@ -108,8 +143,8 @@ class Prior:
     gyro_delay: float = quantity(
         "of the gyro's delay, where it is estimated", "time", "5 ms", bounds=DEVIATION
     )
-    heave: Resonance = Resonance(2.0 * math.pi * 9.0, 0.3, 0.01 * STANDARD_GRAVITY)
-    axial: Resonance = Resonance(2.0 * math.pi * 12.0, 0.5, 0.01 * STANDARD_GRAVITY)
+    heave: Heave = table("flexure along z: 9 Hz, damping 0.3 if absent", Heave())
+    axial: Resonance = table("flexure along x: 12 Hz, damping 0.5 if absent", Resonance())
     rectified: float = 0.0
 
 
@@ -151,15 +186,17 @@ class SensorCalibration:
 
 @dataclass(frozen=True)
 class Timing:
-    """Delays [s], positive where outputs come late.
+    """Delays, positive where outputs come late; a ``gyro_delay`` that is estimated is ``gyro_delay_about`` some value
+    [s], that of the spectra."""
 
-    ``gyro_delay`` of the gyro against the accelerometers, None where it is estimated ``gyro_delay_about`` some value,
-    that of the spectra; ``common_delay`` of all sensors against the stamps, with its standard uncertainty
-    ``common_delay_u``: no sensor sees it.
-    """
-
-    gyro_delay: float | None = None
-    common_delay: float = 0.0
+    gyro_delay: float | None = quantity(
+        "of the gyro against the accelerometers; or estimate", "time", "estimate", example="2 ms", bounds=DELAY,
+        exact=True, words={"estimate": None},
+    )  # fmt: skip
+    common_delay: float = quantity(
+        "of all sensors against the stamps, which none of them sees, with its standard uncertainty; 0 if absent",
+        "time", 0.0, example="0.5(1) ms", bounds=DELAY, u="common_delay_u",
+    )  # fmt: skip
     common_delay_u: float = 0.0
     gyro_delay_about: float = 0.0
 
@@ -168,8 +205,7 @@ class Timing:
 class Estimator:
     """The estimator of the angle; keys other than its kind are of the fusion of all sensors.
 
-    ``snap`` [rad^2/s^7], None where the recording decides (`inercal.systems.aoa.diagnosis.choice`); until then
-    `density`.
+    ``snap`` is None where the recording decides (`inercal.systems.aoa.diagnosis.choice`); until then `density`.
     """
 
     states: States = option("of three accelerometers: 19 all errors, 15, 11, 8 biases alone", 19)
@@ -179,7 +215,11 @@ class Estimator:
         None,
         example="last.json",
     )
-    snap: float | None = None
+    snap: float | None = quantity(
+        "spectral density of the angle's fourth derivative; auto: 1e7 rad^2/s^7, 1e8 from 15 states on, or in a "
+        "livelier file the smallest of 1e9 to 1e12 that fits", "snap density", "auto", example="1e9 rad^2/s^7",
+        bounds=above_zero("a spectral density"), exact=True, words={"auto": None},
+    )  # fmt: skip
     gate: float = option(
         "innovation squared over its variance from which a sample is held back", 25.0, least=1.0
     )
@@ -267,69 +307,22 @@ class PointPlan:
 
 @dataclass(frozen=True)
 class Zero:
-    """A stretch at rest (wind off) from ``start`` to ``end`` [s] of the record, at a known ``angle`` [rad] with its
-    standard uncertainty ``u``."""
+    """A stretch at rest, wind off, at a known angle; ``u`` is its standard uncertainty [rad]."""
 
-    start: float
-    end: float
-    angle: float
-    u: float
-
-
-@dataclass(frozen=True)
-class MotionPlan:
-    """Pitch of the model in a simulation: its kind, and the keys of that kind.
-
-    ``static``: a sweep from ``first`` to ``last`` at a constant rate, over all of the duration. ``pitch-pause``: pauses
-    at ``first``, by ``step``, to ``last``, quintic moves between, and a buffet (its duration follows). ``sine``:
-    ``mean`` + ``amplitude`` sin 2 pi ``frequency`` t. ``two-tone``: with a second sine. ``chirp``: about ``mean``,
-    from ``low`` to ``high``. ``buffet``: about ``mean``, 150 equal sines of random frequency and phase from ``low`` to
-    ``high``, ``rms`` in all. ``file``: the columns t and theta_ref of ``path``, for ``duration`` at most.
-    """
-
-    kind: MotionKind = option(
-        "static: a sweep; pitch-pause: steps with pauses; sine; two-tone; chirp; buffet: random; file: as recorded"
+    start: float = quantity(
+        "of the stretch, in the record's time", "time", REQUIRED, example="0 s", bounds=_INSTANT
     )
-    duration: float = quantity(
-        "of all kinds but pitch-pause; of a file all if absent", "time", "60 s", bounds=TIME
-    )
-    sample_rate: float = quantity("samples per second", "frequency", "1 kHz", bounds=FREQUENCY)
-    mean: float = quantity(
-        "of sine, two-tone, chirp and buffet", "angle", "0 deg", example="30 deg", bounds=_PITCH
-    )
-    amplitude: float = quantity("of sine, two-tone and chirp", "angle", 0.0, example="10 deg", bounds=SIZE)
-    frequency: float = quantity("of sine and two-tone", "frequency", 1.0, example="1 Hz", bounds=FREQUENCY)
-    second_amplitude: float = quantity(
-        "of the second sine of two-tone", "angle", 0.0, example="2 deg", bounds=SIZE
-    )
-    second_frequency: float = quantity(
-        "of the second sine of two-tone", "frequency", 1.0, example="3 Hz", bounds=FREQUENCY
-    )
-    low: float = quantity(
-        "lowest frequency of chirp, buffet and of the buffet in a pitch-pause", "frequency", 2.0,
-        example="0.1 Hz", bounds=FREQUENCY,
+    end: float = quantity("of the stretch", "time", REQUIRED, example="5 s", bounds=_INSTANT)
+    angle: float = quantity(
+        "pitch in that stretch, with its standard uncertainty", "angle", REQUIRED, example="0.00(1) deg",
+        bounds=_ANY_ANGLE, u="u", uncertain=True,
     )  # fmt: skip
-    high: float = quantity("highest frequency of those", "frequency", 15.0, example="5 Hz", bounds=FREQUENCY)
-    rms: float = quantity(
-        "of the buffet, in all; in a pitch-pause none if absent",
-        "angle",
-        0.0,
-        example="0.2 deg",
-        bounds=SIZE,
-    )
-    first: float = quantity(
-        "angle at the start of static and pitch-pause", "angle", 0.0, example="-10 deg", bounds=_PITCH
-    )
-    last: float = quantity(
-        "angle at the end of static and pitch-pause", "angle", 0.0, example="90 deg", bounds=_PITCH
-    )
-    step: float = quantity("of pitch-pause, negative downward", "angle", 0.0, example="10 deg", bounds=_PITCH)
-    move: float = quantity("time of a move of pitch-pause", "time", "1.5 s", bounds=TIME)
-    pause: float = quantity("time of a pause of pitch-pause", "time", "4 s", bounds=TIME)
-    path: Path | None = option(
-        "of kind file: a record beside the study with the columns t and theta_ref", None, example="pitch.csv",
-        name="file",
-    )  # fmt: skip
+    u: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a stretch without length."""
+        if not self.start < self.end:
+            raise InputError("start", f"found {self.start:g} s, expected it before end, {self.end:g} s")
 
 
 @dataclass(frozen=True)
@@ -355,21 +348,21 @@ class AoaSettings:
 
     site: Site
     layout: Layout
-    noise: Noise
-    prior: Prior = field(default_factory=Prior)
+    noise: Noise = table("noise and biases of the sensors")
+    prior: Prior = table("what is not known of the sensors", Prior())
     sensors: Mapping[str, SensorCalibration] = field(default_factory=dict)
-    timing: Timing = field(default_factory=Timing)
-    band: Band = field(default_factory=Band)
-    estimator: Estimator = field(default_factory=Estimator)
-    methods: Methods = field(default_factory=Methods)
+    motion: MotionPlan | None = table("of a simulation; a recording can do without", None)
+    disturbances: Disturbances = table("what a simulation adds to the model", Disturbances())
+    timing: Timing = table("delays of the sensors", Timing())
+    band: Band = table("what of the sensors the fusion takes", Band())
+    estimator: Estimator = table("how the angle is found", Estimator())
+    methods: Methods = table("the paper's way", Methods())
     attitude: Attitude = field(default_factory=Attitude)
-    zero: Zero | None = None
-    points: PointPlan = field(default_factory=PointPlan)
-    alarm: AlarmLimits = field(default_factory=AlarmLimits)
-    motion: MotionPlan | None = None
-    disturbances: Disturbances = field(default_factory=Disturbances)
+    zero: Zero | None = table("a stretch at a known angle", None)
+    points: PointPlan = table("stretches that are test points", PointPlan())
+    alarm: AlarmLimits = table("limits of the angle, for live measurements", AlarmLimits())
     layouts: Mapping[str, Layout] = field(default_factory=dict)
-    goal: Goal = field(default_factory=Goal)
+    goal: Goal = table("uncertainty that a design is to reach", Goal())
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

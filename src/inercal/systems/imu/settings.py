@@ -122,8 +122,17 @@ class Simulation:
     Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
     """
 
-    poses: int = option("of multiposition: held one after the other, the first level", 24, least=4, most=1000)
-    start: float = quantity("length of the first hold, or rest of the table", "time", "30 s", bounds=TIME)
+    poses: int = option(
+        "of multiposition: held one after the other, the first level", 24, least=4, most=1000,
+        kinds=("multiposition",),
+    )  # fmt: skip
+    start: float = quantity(
+        "length of the first hold, or rest of the table",
+        "time",
+        "30 s",
+        bounds=TIME,
+        kinds=("multiposition", "aided"),
+    )
     hold: float = quantity("length of each other hold, position or rest", "time", "3 s", bounds=TIME)
     turning: float = quantity("length of each turn; of the table, by 90 deg", "time", "3 s", bounds=TIME)
     sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
@@ -148,7 +157,7 @@ class Disturbances:
 
     restless_start: float = quantity(
         "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
-        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE,
+        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE, kinds=("multiposition", "ferraris"),
     )  # fmt: skip
     knocks: int = option("turns in which the instrument is knocked", 0, least=0, most=1000)
     knock: float = quantity("angle by which the gyro is wrong after a knock", "angle", "1 deg")
@@ -161,11 +170,12 @@ class Disturbances:
     )  # fmt: skip
     lever_arm: float = quantity(
         "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes", "length",
-        "0 mm", example="50 mm", bounds=NOT_NEGATIVE,
+        "0 mm", example="50 mm", bounds=NOT_NEGATIVE, kinds=("aided",),
     )  # fmt: skip
     delay: float = quantity(
-        "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms"
-    )
+        "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms",
+        kinds=("aided",),
+    )  # fmt: skip
     k2: float = 0.0
 
 
@@ -213,15 +223,21 @@ class ImuSettings:
     site: Site
     static_start: float | None = quantity(
         "length of the still period at the start; found automatically if absent", "time", example="50 s",
-        bounds=TIME,
+        bounds=TIME, kinds=("multiposition",),
     )  # fmt: skip
-    g_sensitivity: bool = option("also estimate how the gyro's drift depends on specific force", False)
-    bias_drift: bool = option("also estimate how the gyro's bias drifts with time", False)
+    g_sensitivity: bool = option(
+        "also estimate how the gyro's drift depends on specific force",
+        False,
+        kinds=("multiposition", "aided"),
+    )
+    bias_drift: bool = option(
+        "also estimate how the gyro's bias drifts with time", False, kinds=("multiposition",)
+    )
     k2: bool = False
     k2_u: float | None = None
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
-        bounds=RELATIVE_U, name="time_base",
+        bounds=RELATIVE_U, name="time_base", kinds=("multiposition", "ferraris", "aided", "known_turns"),
     )  # fmt: skip
     exclude: Exclusion = Exclusion()
     traceability: Mapping[str, str] = field(default_factory=dict)

@@ -13,17 +13,17 @@ import numpy as np
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
-    PART,
     REQUIRED,
     TIME,
     Bounds,
     above_zero,
     option,
-    quantities,
     quantity,
+    table,
     within,
 )
 from inercal.foundation.units import Quantity, parse_quantity
+from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.estimators import FactorKind, FilterKind
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
@@ -32,6 +32,7 @@ from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals, World, w
 from inercal.systems.selfcal.platform.states import (
     ALL,
     EXTENDED_MODEL,
+    LEFT_OUT,
     PAPER,
     STATES,
     USUAL_WAVES,
@@ -148,65 +149,8 @@ class PlatformStates:
 
 
 @dataclass(frozen=True)
-class Disturbances:
-    """Errors that a simulation adds to the model: ``harmonics`` of encoders, a sin(k th + phase), as joint 0, 1, 2,
-    order k, amplitude [rad], phase [rad]; ``base_sway`` about two level axes, amplitude [rad] and frequency [Hz];
-    ``substeps`` of the truth lie between two rows."""
-
-    dropouts: float = quantity(
-        "part of the rows without accelerometers and angles", "number", "0", example="1 %", bounds=PART
-    )
-    harmonics: tuple[tuple[int, int, float, float], ...] = ()
-    command_delay: float = quantity(
-        "by which the platform acts later than commanded", "time", "0 s", example="0.2 s",
-        bounds=within(0.0, math.inf, "a time of 0 or more"),
-    )  # fmt: skip
-    accelerometer_walk: float = quantity(
-        "of their biases about their means, within 60 s", "acceleration random walk", "0 ug/sqrt(s)",
-        example="0.35 ug/sqrt(s)", bounds=within(0.0, math.inf, "a walk of 0 or more"),
-    )  # fmt: skip
-    gyro_walk: float = quantity(
-        "the same of the gyros", "rate random walk", "0 deg/h/sqrt(s)", example="1e-4 deg/h/sqrt(s)",
-        bounds=within(0.0, math.inf, "a walk of 0 or more"),
-    )  # fmt: skip
-    temperature: tuple[float, ...] = quantities(
-        "of the platform, at times evenly from the first row to the last; constant if absent", "temperature",
-        example=["20 degC", "21 degC"], at_least=2,
-    )  # fmt: skip
-    flicker: float = quantity(
-        "1/f noise of the accelerometers, the floor of their Allan deviation", "acceleration", "0 ug", example="1 ug",
-        bounds=within(0.0, math.inf, "a deviation of 0 or more"),
-    )  # fmt: skip
-    gyro_flicker: float = quantity(
-        "the same of the gyros", "rate", "0 deg/h", example="0.001 deg/h",
-        bounds=within(0.0, math.inf, "a deviation of 0 or more"),
-    )  # fmt: skip
-    servo_jitter: float = quantity(
-        "random rate of the drive about each axis, which is commanded too", "rate", "0 deg/s", example="0.01 deg/s",
-        bounds=within(0.0, math.inf, "a rate of 0 or more"),
-    )  # fmt: skip
-    stamp_jitter: float = quantity(
-        "standard deviation of the time stamps", "time", "0 s", example="0.1 ms",
-        bounds=within(0.0, math.inf, "a time of 0 or more"),
-    )  # fmt: skip
-    quantisation: float = quantity(
-        "step of the encoders' readings", "angle", "0 arcsec", example="1 arcsec",
-        bounds=within(0.0, math.inf, "an angle of 0 or more"),
-    )  # fmt: skip
-    lost_rows: float = quantity(
-        "part of the rows that are not in the file", "number", "0", example="1 %", bounds=PART
-    )
-    vibration: float = quantity(
-        "root mean square along each axis, of many frequencies above those of the rows", "acceleration", "0 ug",
-        example="1 mg", bounds=within(0.0, math.inf, "a vibration of 0 or more"),
-    )  # fmt: skip
-    base_sway: tuple[float, float] = (0.0, 0.0)
-    substeps: int = 10
-
-
-@dataclass(frozen=True)
 class Search:
-    """The search for a path; errors of the kinds ``robust``, which are no states, count beside the bound."""
+    """The search for a path."""
 
     turns: int = option("how many at most", 5, least=1, most=50)
     angle: float = quantity("turns are multiples of it", "angle", "30 deg", bounds=_OF_A_TURN)
@@ -220,7 +164,10 @@ class Search:
     rest: float = quantity(
         "after each turn", "time", "0 s", example="10 s", bounds=within(0.0, math.inf, "a time of 0 or more")
     )
-    robust: tuple[str, ...] = ()
+    robust: tuple[Literal[LEFT_OUT], ...] = option(  # type: ignore[valid-type]
+        "errors that are no states, of the size stated under model, or usual: how far they shift coefficients counts "
+        "beside the bound", (), example=["k2", "harmonics"],
+    )  # fmt: skip
     seed: int = option("of the random starts", 1, least=0)
 
 
@@ -261,8 +208,8 @@ class SelfcalSettings:
     """
 
     site: Site
-    noise: Noise
     prior: Array
+    noise: Noise = table("noise of the instruments")
     gimbals: Gimbals = field(default_factory=Gimbals)
     base: Base = field(default_factory=Base)
     heading_unknown: bool = False
@@ -275,7 +222,7 @@ class SelfcalSettings:
     filter: Filter = field(default_factory=Filter)
     model: PlatformStates = field(default_factory=PlatformStates)
     disturbances: Disturbances = field(default_factory=Disturbances)
-    search: Search = field(default_factory=Search)
+    search: Search = table("the search for a path", Search(), name="design")
     placed: tuple[RecordOnBase, ...] = ()
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

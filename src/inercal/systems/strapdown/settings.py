@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     DEVIATION,
@@ -18,13 +19,15 @@ from inercal.foundation.keys import (
     REQUIRED,
     TIME,
     Bounds,
+    Reading,
     above_zero,
     option,
     quantities,
     quantity,
+    table,
     within,
 )
-from inercal.foundation.units import Quantity
+from inercal.foundation.units import Quantity, parse_quantity, shown
 from inercal.systems.strapdown.model.coefficients import GRAVITY, GROUPS, LATITUDE, SIZE, USUAL, Frame
 
 Estimator = Literal["batch", "error-state"]
@@ -32,8 +35,34 @@ Term = Literal["k2", "size", "delay", "asymmetry", "g_sensitivity"]
 
 _MARGIN = within(0.0, math.inf, "a time of 0 or more")
 _NODE = Bounds(lambda time: 0.1 <= time <= 100.0, "a time from 0.1 s to 100 s")
-_WALK = within(0.0, math.inf, "a walk of 0 or more")
-_CLOSURE = within(0.0, math.inf, "a standard deviation of 0 or more")
+_SIZE = within(0.0, math.inf, "0 or more")
+_ESTIMATE = {"estimate": 0.0}
+
+
+def _turn(typed: Any) -> tuple[int, float]:
+    """A turn: axis 0 to 2, which may have a sign, and angle [rad]."""
+    match typed:
+        case [("x" | "y" | "z" | "-x" | "-y" | "-z" | "+x" | "+y" | "+z") as axis, text]:
+            angle = parse_quantity(text, "angle", "turn", "90 deg")
+            if angle.u != 0.0 or not 0.0 < abs(angle.value) <= 2.0 * math.pi:
+                raise InputError(
+                    "turn",
+                    f"found {shown(text)}, expected an angle within 360 deg, not 0, without uncertainty",
+                )
+            return "xyz".index(axis[-1]), -angle.value if axis.startswith("-") else angle.value
+    raise InputError("turn", f'found {shown(typed)}, expected a turn such as ["y", "90 deg"]')
+
+
+_TURN = Reading(
+    _turn,
+    {
+        "type": "array",
+        "items": {"type": "string"},
+        "minItems": 2,
+        "maxItems": 2,
+        "examples": [["y", "90 deg"]],
+    },
+)
 
 TURN_NOISE: Final[tuple[str, ...]] = ("turn_attitude", "turn_velocity")
 WALKS: Final[tuple[str, ...]] = ("gyro_walk", "accelerometer_walk")
@@ -54,20 +83,21 @@ class Noise:
         bounds=above_zero("a velocity random walk"),
     )  # fmt: skip
     gyro_walk: float = quantity(
-        "random walk of the gyros' biases", "rate random walk", "0 deg/h/sqrt(s)", example="0.4 deg/h/sqrt(s)",
-        bounds=_WALK,
+        "random walk of the gyros' biases; estimate finds it from the recording", "rate random walk", "estimate",
+        example="0.4 deg/h/sqrt(s)", bounds=_SIZE, words=_ESTIMATE,
     )  # fmt: skip
     accelerometer_walk: float = quantity(
-        "random walk of the accelerometers' biases", "acceleration random walk", "0 ug/sqrt(s)",
-        example="2 ug/sqrt(s)", bounds=_WALK,
+        "random walk of the accelerometers' biases; estimate finds it from the recording",
+        "acceleration random walk", "estimate", example="2 ug/sqrt(s)", bounds=_SIZE, words=_ESTIMATE,
     )  # fmt: skip
     turn_attitude: float = quantity(
-        "by which the attitude does not close over a turn, beyond the noise of the sensors", "angle", 0.0,
-        example="0.02 deg", bounds=_CLOSURE,
+        "standard deviation by which the attitude does not close over a turn, beyond the noise of the sensors; "
+        "estimate finds it from the recording", "angle", "estimate", example="0.02 deg", bounds=_SIZE, words=_ESTIMATE,
     )  # fmt: skip
     turn_velocity: float = quantity(
-        "the same of the velocity", "velocity", 0.0, example="1 cm/s", bounds=_CLOSURE
-    )
+        "the same of the velocity; estimate finds it from the recording", "velocity", "estimate", example="1 cm/s",
+        bounds=_SIZE, words=_ESTIMATE,
+    )  # fmt: skip
     estimate: tuple[str, ...] = ESTIMABLE
 
     @property
@@ -78,18 +108,31 @@ class Noise:
 
 @dataclass(frozen=True)
 class Rests:
-    """Rests of the unit: ``attitude`` None leaves it free within a rest, ``list`` (begin, end) [s] is of the study."""
+    """Rests of the unit between its turns: ``attitude`` None leaves it free within a rest."""
 
     velocity: float = quantity(
         "standard deviation of the velocity at a node of a rest, about 0: vibration of the stand", "velocity",
         "0.1 mm/s", example="1 mm/s", bounds=DEVIATION,
     )  # fmt: skip
-    attitude: float | None = None
+    attitude: float | None = quantity(
+        "standard deviation of the attitude at a node about that of its rest: sway of the stand; off leaves it free",
+        "angle", "off", example="0.01 deg", bounds=DEVIATION, words={"off": None},
+    )  # fmt: skip
     node: float = quantity("time between nodes of a rest", "time", "1 s", bounds=_NODE)
     margin: float = quantity(
         "time left out at both ends of a rest that is found", "time", "0.2 s", bounds=_MARGIN
     )
-    list: tuple[tuple[float, float], ...] = ()
+    list: tuple[tuple[float, float], ...] = quantity(
+        "begin and end of each rest, from the first sample on; found in the recording if absent", "time", (),
+        example=[["0 s", "69 s"], ["80 s", "168 s"]], bounds=_MARGIN, exact=True, of="begin, end",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse a rest that ends before it begins."""
+        for k, (begin, end) in enumerate(self.list):
+            if begin >= end:
+                found = f"found a rest from {begin:g} s to {end:g} s"
+                raise InputError(f"list.{k}", f"{found}, expected its end after its begin")
 
 
 @dataclass(frozen=True)
@@ -183,20 +226,43 @@ class PathDesign:
 
 @dataclass(frozen=True)
 class Start:
-    """Attitude at the first rest: its ``heading`` [rad] with standard uncertainty; where it is None by the gyrocompass
-    or not, None as the prior of the gyro bias has it."""
+    """Attitude at the first rest."""
 
-    compass: bool | None = None
-    heading: float | None = None
-    heading_u: float = math.radians(100.0)
+    heading: Quantity | Literal["gyrocompass", "free"] | None = quantity(
+        "of the body axis nearest to level, clockwise from north: found from earth rate (gyrocompass), not known "
+        "(free), or stated with its standard uncertainty; gyrocompass if absent where the prior of the gyro bias is "
+        "below earth rate, else free", "angle", example="30(5) deg",
+        words={"gyrocompass": "gyrocompass", "free": "free"},
+    )  # fmt: skip
+
+    @property
+    def angle(self) -> float:
+        """The heading [rad]; 0 where it is not stated."""
+        return self.heading.value if isinstance(self.heading, Quantity) else 0.0
+
+    @property
+    def u(self) -> float:
+        """Its standard uncertainty [rad], 0.01 deg where that is not stated."""
+        return (
+            (self.heading.u or math.radians(0.01))
+            if isinstance(self.heading, Quantity)
+            else math.radians(100)
+        )
 
 
 @dataclass(frozen=True)
 class TurnPlan:
-    """A plan: ``start`` pitch, roll, yaw [rad] of the first rest; ``turns`` (axis 0 to 2 of b, angle [rad])."""
+    """The plan of a test, or of a simulated recording; ``turns`` as (axis 0 to 2 of b, angle [rad])."""
 
-    turns: tuple[tuple[int, float], ...] = ()
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turns: tuple[tuple[int, float], ...] = option(
+        "turns of the unit, consecutively: axis and angle; only a search for them does without", (), least=1,
+        example=[["y", "90 deg"], ["-z", "90 deg"]], reads=_TURN,
+    )  # fmt: skip
+    start: tuple[float, float, float] = quantity(
+        "attitude of the first rest: from x east, y north, z up turned about z by yaw, then about x by pitch, then "
+        "about y by roll; pitch, roll, yaw, 0 if absent", "angle", (0.0, 0.0, 0.0),
+        example=["0 deg", "-90 deg", "0 deg"], exact=True, of="pitch, roll, yaw",
+    )  # fmt: skip
     turn_time: float = quantity("of a turn by 90 deg, others in proportion", "time", "9 s", bounds=TIME)
     dwell: float = quantity("of a rest", "time", "20 s", bounds=TIME)
     first_dwell: float = quantity("of the first rest", "time", "60 s", bounds=TIME)
@@ -243,18 +309,24 @@ class StrapdownSettings:
         "is as good, for units whose biases hardly walk",
         "batch",
     )
-    terms: tuple[Term, ...] = USUAL
+    terms: tuple[Term, ...] = option(
+        "what is estimated beside bias, scale factor and misalignment: second-order coefficients, places of "
+        "accelerometers x and y beside z, delay of the accelerometers; also asymmetry of gyro scale factors and "
+        "g_sensitivity of the gyros", USUAL, example=["k2", "size", "delay"],
+    )  # fmt: skip
     time_base_u: float = quantity(
         "relative standard uncertainty of the record's clock", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="time_base",
     )  # fmt: skip
-    rests: Rests = field(default_factory=Rests)
-    start: Start = field(default_factory=Start)
-    prior: Prior = field(default_factory=Prior)
-    goal: Goal = field(default_factory=Goal)
-    plan: TurnPlan | None = None
-    design: PathDesign | None = None
-    motion: Motion = field(default_factory=Motion)
+    rests: Rests = table("rests between the turns", Rests())
+    start: Start = table("attitude at the first rest", Start())
+    prior: Prior = table("what is known before the test", Prior())
+    goal: Goal = table("wanted standard uncertainties", Goal())
+    plan: TurnPlan | None = table("the plan of a test, or of a simulated recording", None)
+    design: PathDesign | None = table(
+        "the search for a path; without this table the plan is judged alone", None
+    )
+    motion: Motion = table("motion in a simulated recording", Motion())
     truth: Mapping[str, float] = field(default_factory=dict)
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None

@@ -31,9 +31,9 @@ def true_angles(
             commanded = np.round(np.remainder(angles[:, k], 2.0 * np.pi), 9)
             each, of = np.unique(commanded, return_inverse=True)
             true[:, k] += rng.normal(0.0, other.angle, len(each))[of]
-    for joint, order, amplitude, phase in other.harmonics:
-        k = joints.index(joint)
-        true[:, k] += amplitude * np.sin(order * angles[:, k] + phase)
+    for wave in other.harmonics:
+        k = joints.index(wave.joint)
+        true[:, k] += wave.amplitude * np.sin(wave.order * angles[:, k] + wave.phase)
     return true
 
 

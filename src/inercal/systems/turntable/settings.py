@@ -3,38 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from inercal.foundation.arrays import short_repr
 from inercal.foundation.designs.tolerances import Price
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     FREQUENCY,
+    OUTPUT,
     RATE,
     RELATIVE_U,
+    REQUIRED,
     TIME,
     above_zero,
     option,
     quantities,
     quantity,
+    table,
     within,
 )
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.rigs.plans import Plan
 from inercal.foundation.units import Quantity, Unit
 
+JointName = Literal["phi1", "phi2", "phi3"]
+OutputName = Literal["ax", "ay", "az", "wx", "wy", "wz"]
+AnalysedName = Literal["ax", "ay", "az", "wx", "wy", "wz", "y_x", "y_y"]
 BiasDrift = Literal["none", "linear", "exponential", "random_walk"]
 """Drift of the biases over a test."""
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """The sensitivity analysis; ``outputs`` are names of `inercal.foundation.rigs.outputs.NAMES`, or ``y_x``,
-    ``y_y``."""
+    """The sensitivity analysis."""
 
-    outputs: tuple[str, ...] = ("ax", "ay", "az", "wx", "wy")
+    outputs: tuple[AnalysedName, ...] = option(
+        "components of gravity (a) and earth rate (w) on the instrument's axes; y_x, y_y: outputs of a gyrowheel with "
+        "the coefficients of [instrument.coefficients]", ("ax", "ay", "az", "wx", "wy"), least=1,
+    )  # fmt: skip
     method: Literal["exact", "sampled", "local"] = option(
         "exact, from samples, or from derivatives alone", "exact"
     )
@@ -43,6 +52,10 @@ class Analysis:
     )
     samples: int = option("rows at each position; for sampled", 1024, least=2, most=2**24)
     seed: int = option("of the random numbers; for sampled", 1, least=0)
+
+    def __post_init__(self) -> None:
+        """Refuse an output that occurs twice."""
+        _once("outputs", self.outputs)
 
 
 @dataclass(frozen=True)
@@ -95,19 +108,23 @@ class Instrument:
 
 @dataclass(frozen=True)
 class Constraint:
-    """The paper's way: only positions where every index S of ``factors`` on ``outputs`` stays below ``below``."""
+    """Only positions where the sensitivity of outputs to errors is low, the paper's way."""
 
-    factors: tuple[str, ...]
-    outputs: tuple[str, ...]
-    below: float
+    factors: tuple[str, ...] = option("errors of the table by name", least=1)
+    outputs: tuple[OutputName, ...] = option("outputs whose first-order indices count", least=1)
+    below: float = option("what each index stays below", least=0.0, most=1.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a name that occurs twice, and a limit that nothing stays below."""
+        _once("factors", self.factors)
+        _once("outputs", self.outputs)
+        if not self.below > 0.0:
+            raise InputError("below", f"found {self.below:g}, expected a number above 0, at most 1")
 
 
 @dataclass(frozen=True, eq=False)
 class PositionDesign:
-    """The search for positions.
-
-    ``candidates`` from which to choose; ``compare`` named plans to set beside; ``constraint`` the paper's.
-    """
+    """The search for positions: ``candidates`` from which to choose, ``compare`` named plans to set beside."""
 
     candidates: Plan
     positions: int = option("how many", 24, least=1, most=1000)
@@ -116,7 +133,10 @@ class PositionDesign:
     )
     table_errors: bool = option("judge with the errors of the table, or by the noise alone", True)
     compare: tuple[str, ...] = ()
-    constraint: Constraint | None = None
+    constraint: Constraint | None = table(
+        "only positions of low sensitivity; all if absent", None,
+        example={"factors": ["dtheta_x"], "outputs": ["ax"], "below": 0.3}, name="sensitivity",
+    )  # fmt: skip
     seed: int = option("of the random starts", 1, least=0)
 
 
@@ -141,20 +161,28 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
-class Leg:
-    """A part of a rate test: the ``joint`` that turns, and angles [rad] ``at`` which it begins; 0 where absent."""
+class JointAngles:
+    """Angles of the axes."""
 
-    joint: str
-    at: Mapping[str, float] = field(default_factory=dict)
+    phi1: float = quantity("outer angle; 0 if absent", "angle", 0.0, example="40 deg")
+    phi2: float = quantity("of the next axis; 0 if absent", "angle", 0.0, example="40 deg")
+    phi3: float = quantity("of the inner axis of three; 0 if absent", "angle", 0.0, example="40 deg")
+
+    def of(self, joints: Sequence[str]) -> list[float]:
+        """Angles [rad] of some joints."""
+        return [getattr(self, joint) for joint in joints]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leg(JointAngles):
+    """A part of a rate test: the axis that turns, and angles at which it begins."""
+
+    joint: JointName = option("axis that turns")
 
 
 @dataclass(frozen=True)
 class RateTest:
-    """A rate test of gyros: the table turns at each rate in turn, by whole turns or not.
-
-    ``at`` holds angles [rad] of a simulation: where the other joints stand and each stay begins; 0 where absent.
-    ``legs`` are those of a simulation in which several axes turn, one after the other, each at all rates.
-    """
+    """A rate test of gyros: the table turns at each rate in turn, by whole turns or not."""
 
     joint: str = option("axis that turns, where no column joint of the record says", "phi2")
     full_scale: float | None = quantity(
@@ -169,16 +197,18 @@ class RateTest:
         "relative standard uncertainty of the table's rate, common to all rates", "number", "0", example="20 ppm",
         bounds=RELATIVE_U, name="rate_uncertainty",
     )  # fmt: skip
-    at: Mapping[str, float] = field(default_factory=dict)
-    legs: tuple[Leg, ...] = ()
+    at: JointAngles = table(
+        "angles of a simulation, where each stay begins", JointAngles(), example={"phi1": "90 deg"}
+    )
+    legs: tuple[Leg, ...] = table(
+        "axes of a simulation that turn one after the other; joint alone if absent", (),
+        example=[{"joint": "phi1"}, {"joint": "phi1", "phi2": "90 deg"}, {"joint": "phi2"}],
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class StepTest:
-    """A test of accelerometers by small steps about level; all but its being there is for a simulation.
-
-    ``at`` holds angles [rad] at which the table is level; 0 where absent.
-    """
+    """A test by small steps about level: threshold, dead zone and hysteresis of accelerometers."""
 
     joint: str = option("axis that tilts; for simulate", "phi1")
     largest: float = quantity(
@@ -191,18 +221,26 @@ class StepTest:
         bounds=above_zero("an angle"),
     )
     cycles: int = option("times up, down and back; for simulate", 2, least=1, most=1000)
-    at: Mapping[str, float] = field(default_factory=dict)
+    at: JointAngles = table(
+        "angles of a simulation, where the accelerometer is level", JointAngles(), example={"phi2": "90 deg"}
+    )
+
+
+@dataclass(frozen=True)
+class TableHarmonic:
+    """An error of an encoder that repeats with its angle: amplitude times sin(order times angle + phase)."""
+
+    joint: JointName = option("the joint")
+    order: int = option("periods in a full turn", least=1, most=100_000)
+    amplitude: float = quantity("of the error", "angle", REQUIRED, example="5 arcsec")
+    phase: float = quantity("at angle 0; 0 if absent", "angle", 0.0, example="40 deg")
 
 
 @dataclass(frozen=True)
 class Disturbances:
     """Disturbances that a simulation adds to table and instrument, and no calibration knows; none if absent.
 
-    Those of outputs are in the SI unit of these: ``ramp`` their change over the test, ``warm_up`` their excess at its
-    begin, ``random_walk`` its standard deviation at the end, ``dead_zone`` the response below which there is none,
-    ``hysteresis`` the output after it was raised less that after it was lowered, ``magnetic`` that along a field to the
-    north and down. ``harmonics`` are errors of encoders: joint, order k, amplitude [rad], phase [rad]:
-    a sin(k phi + phase).
+    Those of outputs are in the SI unit of these.
     """
 
     heading: float = quantity(
@@ -223,13 +261,41 @@ class Disturbances:
     )
     warm_up_time: float = quantity("in which the warm-up falls to 1/e", "time", "30 min", bounds=TIME)
     dip: float = quantity("of the field below the horizon", "angle", "60 deg")
-    harmonics: tuple[tuple[str, int, float, float], ...] = ()
-    ramp: float = 0.0
-    warm_up: float = 0.0
-    random_walk: float = 0.0
-    dead_zone: float = 0.0
-    hysteresis: float = 0.0
-    magnetic: float = 0.0
+    harmonics: tuple[TableHarmonic, ...] = table(
+        "errors of the encoders; none if absent", (),
+        example=[{"joint": "phi2", "order": 1, "amplitude": "5 arcsec", "phase": "0 deg"}],
+    )  # fmt: skip
+    ramp: float = quantity(
+        "steady change of the outputs from begin to end of the test", OUTPUT, 0.0, example="0.2 deg/h"
+    )
+    warm_up: float = quantity(
+        "excess of the outputs at the begin, which dies away", OUTPUT, 0.0, example="0.2 deg/h"
+    )
+    random_walk: float = quantity(
+        "standard deviation that a random walk of the outputs has at the end of the test", OUTPUT, 0.0,
+        example="0.1 deg/h", bounds=within(0.0, math.inf, "a value of 0 or more"),
+    )  # fmt: skip
+    dead_zone: float = quantity(
+        "response to an input below which there is none: the output stays at its bias", OUTPUT, 0.0,
+        example="0.05 deg/h", bounds=within(0.0, math.inf, "a value of 0 or more"),
+    )  # fmt: skip
+    hysteresis: float = quantity(
+        "output after it was raised less that after it was lowered, at the same input", OUTPUT, 0.0,
+        example="0.05 deg/h",
+    )  # fmt: skip
+    magnetic: float = quantity(
+        "output along a field that is fixed to the ground, to the north and down",
+        OUTPUT,
+        0.0,
+        example="0.05 deg/h",
+    )
+
+
+def _once(key: str, names: Sequence[str]) -> None:
+    """Raise `InputError` for a name that occurs twice."""
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError(key, f"found {name!r} twice, expected each once")
 
 
 @short_repr
@@ -262,11 +328,11 @@ class TurntableSettings:
     chain: Chain
     plan: Plan
     design: PositionDesign
-    analysis: Analysis = Analysis()
+    analysis: Analysis = table("the sensitivity analysis", Analysis())
     instrument: Instrument = Instrument()
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    rate_test: RateTest | None = None
-    step_test: StepTest | None = None
+    rate_test: RateTest | None = table("a rate test; none if absent", None)
+    step_test: StepTest | None = table("a test by small steps about level; none if absent", None)
     disturbances: Disturbances = Disturbances()
     tolerances: Tolerances = Tolerances()
     traceability: Mapping[str, str] = field(default_factory=dict)

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import islice, pairwise
+from typing import TypeVar
 
 import numpy as np
 
@@ -42,7 +43,9 @@ from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
 from inercal.systems.aoa.reading.recording import Recording, in_time
-from inercal.systems.aoa.settings import AoaSettings, Prior, Resonance
+from inercal.systems.aoa.settings import AoaSettings, Direction, Heave, Prior, Resonance
+
+R = TypeVar("R", bound=Resonance)
 
 DENSITIES = (1e9, 1e10, 1e11, 1e12)
 """Densities [rad^2/s^7] beyond the usual one."""
@@ -162,7 +165,7 @@ def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings
     z, x, acceleration = np.max([_flexure(part, settings) for part in stretches], axis=0).tolist()
     moved = math.hypot(prior.lever_common, prior.lever) * acceleration
 
-    def calm(each: Resonance, before: Resonance, rms: float) -> Resonance:
+    def calm(each: R, before: Resonance, rms: float) -> R:
         largest = before.level
         for _ in range(LIMITS.calm_steps if each == before else 0):
             if moved < largest and rms < LIMITS.calm_share * each.level:
@@ -198,11 +201,12 @@ def _shaken(prior: Prior) -> Iterator[Prior]:
     """
     if not _usual_flexure(prior):
         return
-    frequency = 2.0 * math.pi * LIMITS.shaking_frequency
-    for vertical in (True, False):
+    directions: tuple[Direction, ...] = ("vertical", "z")
+    for direction in directions:
         for level in SHAKING:
-            wide = Resonance(frequency, LIMITS.shaking_damping, level, vertical)
-            yield replace(prior, heave=wide, axial=prior.axial if vertical else wide)
+            wide = LIMITS.shaking_frequency, LIMITS.shaking_damping, level
+            axial = prior.axial if direction == "vertical" else Resonance(*wide)
+            yield replace(prior, heave=Heave(*wide, direction), axial=axial)
 
 
 def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
@@ -227,7 +231,7 @@ def of_vibration(settings: AoaSettings, decided: AoaSettings) -> list[Finding]:
             "allows for it"
         )
         action = (
-            f'to have the same again write frequency = "{flexure.frequency / 2.0 / math.pi:.3g} Hz", '
+            f'to have the same again write frequency = "{flexure.frequency:.3g} Hz", '
             f'damping = "{flexure.damping:.3g}", level = "{flexure.level / STANDARD_GRAVITY:.3g} g"'
             + (
                 ', direction = "vertical" under [prior.heave]'

@@ -101,7 +101,7 @@ def problem(
         add("levers", common + own * np.eye(n), *(f"dr_{k}" for k in each))
     if states >= 15:
         # variances of s and s'
-        both = [((of.level / of.frequency) ** 2, of.level**2) for of in (prior.heave, prior.axial)]
+        both = [((of.level / of.omega) ** 2, of.level**2) for of in (prior.heave, prior.axial)]
         add("resonators", np.diag(np.ravel(both)), *_FLEXURE)
     if states >= 19:
         add("heights", prior.height**2 * np.eye(n), *(f"zo_{k}" for k in each))
@@ -153,10 +153,10 @@ def _constants(settings: AoaSettings) -> Constants:
         common_delay_u=timing.common_delay_u,
         roll_cosine=settings.attitude.level,
         gate=settings.estimator.gate,
-        heave_frequency=heave.frequency,
+        heave_frequency=heave.omega,
         heave_damping=heave.damping,
         heave_level=heave.level,
-        axial_frequency=axial.frequency,
+        axial_frequency=axial.omega,
         axial_damping=axial.damping,
         axial_level=axial.level,
         plunge=heave.vertical,

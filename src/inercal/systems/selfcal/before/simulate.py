@@ -15,6 +15,7 @@ from inercal.foundation.geometry.rotations import exp, multiply
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.selfcal.before.driven import Driven, drive
+from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.platform.joint_limits import beyond
@@ -25,7 +26,7 @@ from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import World
 from inercal.systems.selfcal.platform.states import StateVector
 from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
-from inercal.systems.selfcal.settings import Disturbances, Noise, SelfcalSettings
+from inercal.systems.selfcal.settings import Noise, SelfcalSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +117,10 @@ def simulate(experiment: Experiment, rng: np.random.Generator) -> SimulatedPlatf
     if other.flicker > 0.0:
         acc += flicker(other.flicker, n, rng)
     measured = read + noise.encoder * rng.standard_normal((n, 3))
-    for joint, order, amplitude, phase in other.harmonics:
-        measured[:, joint] += amplitude * np.sin(order * th[:, joint] + phase)
-    if other.base_sway[0] > 0.0 and not experiment.fixed:
+    for wave in other.harmonics:
+        joint = "xyz".index(wave.axis)
+        measured[:, joint] += wave.amplitude * np.sin(wave.order * th[:, joint] + wave.phase)
+    if other.base_sway and not experiment.fixed:
         swayed = np.empty((n, 3))
         world, about = experiment.world, _swaying(experiment, rng)
         all_angles(multiply(exp(-about), q), experiment.motion.angles[0], world.axes, world.signs, swayed)
@@ -175,7 +177,7 @@ def _driven(experiment: Experiment, rng: np.random.Generator) -> tuple[Array, ..
     n, dt = len(t), float(t[1] - t[0])
     wander = experiment.noise.angle_random_walk / math.sqrt(dt) * rng.standard_normal((n - 1, 3))
     wander += _of_biases(experiment, rng)
-    sway = _swaying(experiment, rng) if experiment.disturbances.base_sway[0] > 0.0 else np.zeros((n, 3))
+    sway = _swaying(experiment, rng) if experiment.disturbances.base_sway else np.zeros((n, 3))
     warm = np.zeros(n) if experiment.warm is None else experiment.warm
     out = Driven(np.empty((n, 4)), np.empty((n - 1, 3)), np.empty((n, 3)), np.empty((n, 3)))
     drive(angles, sway, dt, wander, warm, experiment.truth, experiment.layout, experiment.world, out)
@@ -195,10 +197,11 @@ def _of_biases(experiment: Experiment, rng: np.random.Generator) -> Array:
 
 def _swaying(experiment: Experiment, rng: np.random.Generator) -> Array:
     """Turns (n, 3) [rad] of the base about level axes, in b."""
-    amplitude, frequency = experiment.disturbances.base_sway
-    swing = 2.0 * math.pi * (frequency * experiment.motion.t + rng.random())
+    sway = experiment.disturbances.base_sway
+    assert sway is not None
+    swing = 2.0 * math.pi * (sway.frequency * experiment.motion.t + rng.random())
     return np.asarray(
-        amplitude * np.stack([np.cos(swing), np.sin(swing)], axis=-1) @ _level(experiment.world)
+        sway.amplitude * np.stack([np.cos(swing), np.sin(swing)], axis=-1) @ _level(experiment.world)
     )
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from inercal.foundation.errors import InputError
+from inercal.foundation.keys import RATE, above_zero, quantity, table
 from inercal.systems.selfcal.platform.plan import NO_LIMIT, PlatformPlan, Turn, of_joints
 from inercal.systems.selfcal.platform.rig import JOINTS
 
@@ -18,12 +20,48 @@ _SLACK = 1e-9
 """Angle [rad] that is rounding."""
 
 
-@dataclass(frozen=True)
-class ForbiddenAngles:
-    """Angles that the joints may not have together: a range (low, high) [rad] of each, a whole turn more or less the
-    same place; `ANY` where a joint does not matter."""
+_ENDS = "the lowest, the highest angle"
 
-    ranges: tuple[Range, Range, Range] = (ANY, ANY, ANY)
+
+@dataclass(frozen=True)
+class JointRanges:
+    """Ranges within which the gimbals turn; no limits if absent."""
+
+    x: Range | None = quantity(
+        "lowest and highest outer angle", "angle", example=["-180 deg", "180 deg"], of=_ENDS
+    )
+    y: Range | None = quantity("of the inner joint", "angle", example=["-80 deg", "80 deg"], of=_ENDS)
+    z: Range | None = quantity(
+        "of the joint of the platform", "angle", example=["-360 deg", "360 deg"], of=_ENDS
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse ends out of order."""
+        for name, (low, high) in self.by_joint.items():
+            if not low < high:
+                found = f"found {math.degrees(low):.6g} deg to {math.degrees(high):.6g} deg"
+                raise InputError(name[-1], f"{found}, expected the lower end first")
+
+    @property
+    def by_joint(self) -> dict[str, Range]:
+        """Ranges of the joints that have one, by name of the angle."""
+        return {name: ends for name in JOINTS if (ends := getattr(self, name[-1])) is not None}
+
+
+@dataclass(frozen=True)
+class ForbiddenAngles(JointRanges):
+    """Angles that the joints may not have together, whole turns aside; any angle of a joint that is absent."""
+
+    def __post_init__(self) -> None:
+        """Refuse a region without angles."""
+        super().__post_init__()
+        if not self.by_joint:
+            raise InputError("", "found no angles, expected those of a joint")
+
+    @property
+    def ranges(self) -> tuple[Range, Range, Range]:
+        """Range of each joint."""
+        return self.x or ANY, self.y or ANY, self.z or ANY
 
     def meets(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> bool:
         """True where angles between ``low`` and ``high`` (3,) [rad] of each joint lie in the region; its edges do not
@@ -45,13 +83,44 @@ def _overlap(part: Range, asked: Range) -> bool:
 
 
 @dataclass(frozen=True)
-class JointLimits:
-    """Largest ``rate`` (3,) [rad/s] and ``acceleration`` (3,) [rad/s^2] of the joints x, y, z, and the regions that are
-    ``forbidden``."""
+class FixedJoints:
+    """Joints that do not turn, of a rig of one or two axes; a record needs no column of their angles."""
 
-    rate: tuple[float, float, float] = NO_LIMIT
-    acceleration: tuple[float, float, float] = NO_LIMIT
-    forbidden: tuple[ForbiddenAngles, ...] = ()
+    x: float | None = quantity("outer angle", "angle", example="0 deg", exact=True)
+    y: float | None = quantity("of the inner joint", "angle", example="0 deg", exact=True)
+    z: float | None = quantity("of the joint of the platform", "angle", example="0 deg", exact=True)
+
+    def __post_init__(self) -> None:
+        """Refuse a rig of which nothing turns."""
+        if len(self.by_joint) == len(JOINTS):
+            raise InputError("", "found all joints, expected one that turns")
+
+    @property
+    def by_joint(self) -> dict[str, float]:
+        """Angle [rad] of the joints that do not turn, by name."""
+        return {name: angle for name in JOINTS if (angle := getattr(self, name[-1])) is not None}
+
+
+_JOINTS = "the joints x, y, z"
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of the joints x, y, z: rates and accelerations (3,), and regions."""
+
+    rate: tuple[float, float, float] = quantity(
+        "largest rate of the joints, one for all or x, y, z; those of the plan if absent", "rate", NO_LIMIT,
+        example=["5 deg/s", "2 deg/s", "5 deg/s"], bounds=RATE, name="joint_rate", of=_JOINTS, one=True,
+    )  # fmt: skip
+    acceleration: tuple[float, float, float] = quantity(
+        "by which turns begin and end, one for all or x, y, z; at once if absent", "rate ramp", NO_LIMIT,
+        example=["2 deg/s^2", "1 deg/s^2", "2 deg/s^2"], bounds=above_zero("an acceleration"),
+        name="joint_acceleration", of=_JOINTS, one=True,
+    )  # fmt: skip
+    forbidden: tuple[ForbiddenAngles, ...] = table(
+        "regions that no path of the rig may touch, such as where something is in the way", (),
+        example=[{"x": ["80 deg", "100 deg"], "y": ["20 deg", "60 deg"]}],
+    )  # fmt: skip
 
     def kept(self, plan: PlatformPlan) -> PlatformPlan:
         """The plan with turns that state no rate as slow as their joint, and with the accelerations of the joints."""

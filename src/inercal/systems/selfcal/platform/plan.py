@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.keys import RATE, TIME, quantity
 from inercal.systems.selfcal.platform.rig import JOINTS, World
 
 JointName = Literal["x", "y", "z"]
@@ -55,9 +56,12 @@ class PlatformPlan:
     """
 
     moves: tuple[Move, ...]
-    rate: float = math.radians(1.0)
-    step: float = 0.2
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rate: float = quantity("of the turns", "rate", "1 deg/s", bounds=RATE)
+    step: float = quantity("from row to row", "time", "0.2 s", bounds=TIME)
+    start: tuple[float, float, float] = quantity(
+        "angles of the joints x, y, z at the start; 0 if absent", "angle", (0.0, 0.0, 0.0),
+        example=["0 deg", "0 deg", "0 deg"], of="x, y, z",
+    )  # fmt: skip
     acceleration: tuple[float, float, float] = NO_LIMIT
 
     def steps(self, move: Move) -> int:

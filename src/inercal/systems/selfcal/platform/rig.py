@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site, earth_rate
 from inercal.foundation.geometry.rotations import (
     Axis,
@@ -28,7 +29,9 @@ from inercal.foundation.geometry.rotations import (
     multiply,
     to_matrix,
 )
+from inercal.foundation.keys import Reading, option, quantity, within
 from inercal.foundation.rigs.chain import Chain, Joint
+from inercal.foundation.units import shown
 
 JOINTS = ("th_x", "th_y", "th_z")
 """Names of the gimbal angles, outer first."""
@@ -46,13 +49,41 @@ _AXES: Mapping[str, Array] = {
 }
 
 
+def _once_each(axes: Any) -> tuple[Any, ...]:
+    """The axes of a study: x, y and z in some order."""
+    if not isinstance(axes, list) or sorted(map(str, axes)) != ["x", "y", "z"]:
+        raise InputError(
+            "gimbals", f'found {shown(axes)}, expected "x", "y" and "z" once each, the outer joint first'
+        )
+    return tuple(axes)
+
+
+def _three_signs(signs: Any) -> tuple[int, ...]:
+    """The signs of a study: three of 1 and -1."""
+    good = isinstance(signs, list) and len(signs) == 3
+    if not good or any(type(sign) is not int or sign not in (1, -1) for sign in signs):
+        raise InputError("signs", f"found {shown(signs)}, expected three of 1 and -1, for the joints x, y, z")
+    return tuple(signs)
+
+
+def _three(choices: list[Any]) -> dict[str, Any]:
+    """JSON Schema of a list of three of such."""
+    return {"type": "array", "items": {"enum": choices}, "minItems": 3, "maxItems": 3}
+
+
 @dataclass(frozen=True, eq=False)
 class Gimbals:
     """The joints, outer first: ``axes`` of p along which they lie at zero angles, and their ``signs``, -1 where the
     angle counts left-handed."""
 
-    axes: tuple[Axis, Axis, Axis] = ("z", "x", "y")
-    signs: tuple[int, int, int] = (1, 1, 1)
+    axes: tuple[Axis, Axis, Axis] = option(
+        "axis of the platform along which each joint lies at zero angles, outer first", ("z", "x", "y"),
+        example=["z", "x", "y"], name="gimbals", reads=Reading(_once_each, _three(["x", "y", "z"])),
+    )  # fmt: skip
+    signs: tuple[int, int, int] = option(
+        "of the angles: -1 where one counts left-handed", (1, 1, 1), example=[1, 1, 1],
+        reads=Reading(_three_signs, _three([1, -1])),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Refuse two joints about one axis, which no three angles make good."""
@@ -78,13 +109,22 @@ class Gimbals:
 class Base:
     """Attitude of frame b on the earth: axes of b lie along those of ``frame`` at zero heading and tilt.
 
-    ``heading`` [rad] turns the base clockwise as seen from above, from north to east; ``tilt`` [rad] then about north
-    and about east, right-handed; both with standard uncertainties ``heading_u`` and ``tilt_u`` [rad].
+    ``heading`` [rad] turns the base clockwise as seen from above; ``tilt`` [rad] then about north and about east,
+    right-handed; both with standard uncertainties ``heading_u`` and ``tilt_u`` [rad].
     """
 
-    frame: Frame = "nue"
-    heading: float = 0.0
-    tilt: tuple[float, float] = (0.0, 0.0)
+    frame: Frame = option(
+        "axes of the platform at zero angles: north-up-east, east-north-up, north-east-down", "nue"
+    )
+    heading: float = quantity(
+        "of the base, from north to east; may carry an uncertainty; unknown: found from the record; 0 if absent",
+        "angle", 0.0, example="40 deg", u="heading_u", words={"unknown": 0.0},
+    )  # fmt: skip
+    tilt: tuple[float, float] = quantity(
+        "of the base, about north and about east; may carry uncertainties; level if absent", "angle", (0.0, 0.0),
+        example=["0 arcmin", "0 arcmin"], u="tilt_u", of="the one about north, the one about east",
+        bounds=within(-0.5 * math.pi, 0.5 * math.pi, "an angle from -90 deg to 90 deg"),
+    )  # fmt: skip
     heading_u: float = 0.0
     tilt_u: tuple[float, float] = (0.0, 0.0)
 

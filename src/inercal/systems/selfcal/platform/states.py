@@ -176,6 +176,9 @@ ADDED: Final[Mapping[str, tuple[str, ...]]] = {
 } | {"temperature": TEMPERATURE, "bias_walk": BIAS_WALK}
 """Additions to such a set -> their kinds."""
 
+LEFT_OUT: Final = tuple(kind for kind, state in STATES.items() if state.key)
+"""Kinds of errors of the rig that a study may leave out of the states."""
+
 USUAL_WAVES: Final = tuple((joint, order) for joint in range(3) for order in (1, 2))
 """Joint and order of harmonics where the study names none."""
 

@@ -41,17 +41,15 @@ def beginning(motion: BodyMotion, nodes: Nodes, settings: StrapdownSettings) -> 
     north = axis - (axis @ up) * up
     north /= np.linalg.norm(north)
     level = from_matrix(np.stack([np.cross(north, up), north, up]))
-    heading = np.array([0.0, 0.0, -(settings.start.heading or 0.0)])
+    heading = np.array([0.0, 0.0, -settings.start.angle])
     return Beginning(multiply(exp(heading), level), u)
 
 
 def _by_compass(settings: StrapdownSettings) -> bool:
     """True where the heading at the start is found from earth rate."""
-    compass = settings.start.compass
-    if compass is None:
-        earth = EARTH_RATE * np.cos(settings.latitude)
-        return settings.start.heading is None and bool(settings.prior.gyro_bias < earth)
-    return compass
+    heading = settings.start.heading
+    earth = EARTH_RATE * np.cos(settings.latitude)
+    return bool(settings.prior.gyro_bias < earth) if heading is None else heading == "gyrocompass"
 
 
 def start_u(settings: StrapdownSettings) -> Array:
@@ -59,7 +57,7 @@ def start_u(settings: StrapdownSettings) -> Array:
     accelerometers whose biases are not known yet."""
     start = settings.start
     tilt = math.hypot(LIMITS.start_tilt, settings.prior.bias / STANDARD_GRAVITY)
-    return np.array([tilt, tilt, LIMITS.start_heading if _by_compass(settings) else start.heading_u])
+    return np.array([tilt, tilt, LIMITS.start_heading if _by_compass(settings) else start.u])
 
 
 def first_coefficients(samples: Samples, nodes: Nodes) -> Array:

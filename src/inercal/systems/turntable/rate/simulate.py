@@ -18,7 +18,7 @@ from inercal.systems.turntable.rate.calibration import check_rate_test
 from inercal.systems.turntable.rate.ends import ends, known_change, settled
 from inercal.systems.turntable.rate.fit import approaches
 from inercal.systems.turntable.rate.stays import arc, over_turn, sensed
-from inercal.systems.turntable.settings import Leg, TurntableSettings
+from inercal.systems.turntable.settings import TurntableSettings
 
 
 def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) -> Record:
@@ -65,12 +65,14 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
             "instrument.coefficients",
             f"found {squares[0]}, expected no squares of force in a simulated rate test",
         )
-    legs = test.legs or (Leg(test.joint, test.at),)
+    legs: list[tuple[str, list[float]]] = [(leg.joint, leg.of(chain.joints)) for leg in test.legs] or [
+        (test.joint, test.at.of(chain.joints))
+    ]
     rate = np.tile(test.rates, len(legs))
     n, each = len(rate), len(test.rates)
     t = np.asarray(instrument.dwell * (np.arange(n) + 0.5))
-    turning = np.repeat([chain.joints.index(leg.joint) for leg in legs], each)
-    angles = np.repeat([[leg.at.get(joint, 0.0) for joint in chain.joints] for leg in legs], each, axis=0)
+    turning = np.repeat([chain.joints.index(joint) for joint, _ in legs], each)
+    angles = np.repeat([begin for _, begin in legs], each, axis=0)
     ended = angles.copy()
     ended[np.arange(n), turning] += rate * instrument.dwell
     both = (
@@ -80,10 +82,10 @@ def simulate_rate_test(settings: TurntableSettings, rng: np.random.Generator) ->
     true_rate = rate * (1.0 + test.rate_u * rng.standard_normal())
     w, f = np.empty((n, 3)), np.empty((n, 3))
     way = np.empty(n)
-    for k, leg in enumerate(legs):
+    for k, (joint, _) in enumerate(legs):
         of = slice(k * each, (k + 1) * each)
         at_ends = None if both is None else np.concatenate([both[:n][of], both[n:][of]])
-        w[of], f[of] = _felt(settings, chain, leg.joint, angles[of], true_rate[of], errors[of], at_ends)
+        w[of], f[of] = _felt(settings, chain, joint, angles[of], true_rate[of], errors[of], at_ends)
         way[of] = approaches(rate[of])
     full_scale = test.full_scale or float(np.abs(rate).max())
     y = []

@@ -37,7 +37,7 @@ def simulate_step_test(settings: TurntableSettings, rng: np.random.Generator) ->
     test, joints = settings.step_test, settings.chain.joints
     assert test is not None
     tilts = sequence(test)
-    angles = np.tile([test.at.get(joint, 0.0) for joint in joints], (len(tilts), 1))
+    angles = np.tile(test.at.of(joints), (len(tilts), 1))
     angles[:, joints.index(test.joint)] += tilts
     return simulate(replace(settings, plan=Plan("steps", angles)), rng)
 
