@@ -330,7 +330,7 @@ def test_verbs_survive_any_order_of_imports():
 @pytest.mark.parametrize(
     "module",
     [
-        *(f"faces.python.{room}" for room in ("recordings", "study", "verbs", "noise", "calibrations")),
+        *(f"faces.python.{room}" for room in ("recordings", "study", "verbs", "calibrations")),
         "laboratory.verbs",
         "laboratory.fleet.batch",
     ],
