@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from inercal.faces.python.result import Result, of_coefficients
 from inercal.faces.studies.text import toml
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.places import counted_names
@@ -216,6 +217,38 @@ def calibrations(
 
             calibrated.append(_traced(calibrate(record, study.settings, say), record, study))
     return calibrated
+
+
+def of_runs(
+    records: Sequence[Record],
+    study: Study,
+    progress: Progress,
+    calibrate: Callable[[Record, Any, Progress], T],
+    one: Callable[[T], Result],
+    title: str,
+    shown_of: Callable[[Estimate, T], Estimate] = lambda estimate, first: estimate.shown(),
+) -> Result:
+    """The result of ``one`` record, or of repeat runs together, whose ``evidence`` has a calibration for each.
+
+    ``title`` is that of their page; ``shown_of`` an estimate, and the calibration of the first run, is the estimate in
+    the units of the command line.
+    """
+    from inercal.foundation.results.repeat import combine_runs
+
+    calibrated: list[Any] = calibrations(records, study, progress, calibrate)
+    if len(calibrated) == 1:
+        return one(calibrated[0])
+    runs = [calibration.estimate for calibration in calibrated]
+    estimate = with_span(combine_runs(runs), records[0])
+    shown = shown_of(estimate, calibrated[0])
+
+    def page() -> str:
+        from inercal.faces.report.coefficients import repeats
+        from inercal.faces.report.html import render
+
+        return render(shown, repeats(shown), title)
+
+    return Result(estimate, of_coefficients(shown, page), tuple(calibrated))
 
 
 def of_files(

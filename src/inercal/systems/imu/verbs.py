@@ -2,54 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inercal.faces.python.result import Result, of_coefficients
-from inercal.faces.python.study import Study
+from inercal.faces.python.study import Progress, Study, of_files, of_runs
 from inercal.foundation.records.record import Record
 from inercal.systems.imu.task import calibrate as calibrate_run
+from inercal.systems.imu.task import calibrate_files, in_order
 
 if TYPE_CHECKING:
+    from inercal.systems.imu.task import Calibrated
     from inercal.systems.imu.temperature.model import TemperatureModel
 
 
 def calibrate(
-    records: Sequence[Record],
-    study: Study,
-    compare: bool = False,
-    progress: Callable[[str], None] = lambda _: None,
+    records: Sequence[Record], study: Study, compare: bool = False, progress: Progress = lambda _: None
 ) -> Result:
     """Calibrate an IMU from one run, or from repeat runs together; ``evidence`` has a calibration for each.
 
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
-    from inercal.faces.python.study import calibrations, of_files, with_span
-    from inercal.foundation.results.repeat import combine_runs
-    from inercal.systems.imu.task import calibrate_files, in_order
-
     if in_order(study.settings):
-        calibrated = [of_files(records, study, progress, calibrate_files)]
-    else:
-        calibrated = calibrations(records, study, progress, calibrate_run)
-    runs = [each.estimate for each in calibrated]
-    estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
-    shown = estimate.shown()
+        return _one(of_files(records, study, progress, calibrate_files))
+    title = "Calibration of an inertial measurement unit"
+    return of_runs(records, study, progress, calibrate_run, _one, title)
+
+
+def _one(calibration: Calibrated) -> Result:
+    """The result of one calibration."""
 
     def page() -> str:
-        from inercal.faces.report.coefficients import repeats
-        from inercal.faces.report.html import render
         from inercal.systems.imu import figures
 
-        if len(calibrated) == 1:
-            return figures.page(calibrated[0])
-        return render(shown, repeats(shown), "Calibration of an inertial measurement unit")
+        return figures.page(calibration)
 
-    return Result(
-        estimate, of_coefficients(shown, page), calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
-    )
+    return Result(calibration.estimate, of_coefficients(calibration.estimate.shown(), page), calibration)
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:

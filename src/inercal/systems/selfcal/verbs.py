@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.python.result import Result, View, of_coefficients
-from inercal.faces.python.study import Progress, Study, calibrations, designed_by, of_files, with_span
+from inercal.faces.python.study import Progress, Study, designed_by, of_files, of_runs
 from inercal.foundation.computing.executors import Executor
 from inercal.foundation.errors import InputError
 from inercal.foundation.records.record import Record
@@ -17,6 +17,7 @@ from inercal.systems.selfcal import task
 
 if TYPE_CHECKING:
     from inercal.faces.report.html import Picture
+    from inercal.systems.selfcal.settings import SelfcalSettings
 
 
 def prepare(study: Study, compare: bool = False) -> None:
@@ -42,13 +43,12 @@ def calibrate(
 
     if study.settings.placed:
         return _together(records, study, progress)
-    calibrated = calibrations(
-        records,
-        study,
-        progress,
-        lambda record, settings, say: task.calibrate(record, settings, compare, say, courses),
-    )
-    return _one(calibrated[0], courses) if len(calibrated) == 1 else _repeated(calibrated, records)
+
+    def run(record: Record, settings: SelfcalSettings, say: Progress) -> task.Calibration:
+        return task.calibrate(record, settings, compare, say, courses)
+
+    title = "Self-calibration of a platform, repeat runs"
+    return of_runs(records, study, progress, run, lambda calibration: _one(calibration, courses), title)
 
 
 def _one(calibration: task.Calibration, courses: bool) -> Result:
@@ -87,23 +87,6 @@ def _together(records: Sequence[Record], study: Study, progress: Progress) -> Re
         )
 
     return Result(fitted.estimate, of_coefficients(shown, page), fitted.each)
-
-
-def _repeated(calibrated: Sequence[task.Calibration], records: Sequence[Record]) -> Result:
-    """The estimate of repeat runs together."""
-    from inercal.foundation.results.repeat import combine_runs
-
-    runs = [each.estimate for each in calibrated]
-    estimate = combine_runs(runs)
-    shown = estimate.shown()
-
-    def page() -> str:
-        from inercal.faces.report.coefficients import repeats
-        from inercal.faces.report.html import render
-
-        return render(shown, repeats(shown), "Self-calibration of a platform, repeat runs")
-
-    return Result(with_span(estimate, records[0]), of_coefficients(shown, page), tuple(calibrated))
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:

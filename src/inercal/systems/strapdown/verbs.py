@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inercal.faces.python.result import Result, View, of_coefficients
-from inercal.faces.python.study import Progress, Study, calibrations, designed_by, with_span
+from inercal.faces.python.study import Progress, Study, designed_by, of_runs
 from inercal.foundation.records.record import Record
 from inercal.systems.strapdown import task
 
@@ -30,24 +30,19 @@ def calibrate(
 
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``.
     """
-    from inercal.foundation.results.repeat import combine_runs
+    title = "Calibration of a strapdown unit, repeat runs"
+    return of_runs(records, study, progress, task.calibrate, _one, title)
 
-    calibrated = calibrations(records, study, progress, task.calibrate)
-    runs = [each.estimate for each in calibrated]
-    estimate = runs[0] if len(runs) == 1 else with_span(combine_runs(runs), records[0])
-    shown = estimate.shown()
+
+def _one(calibration: task.StrapdownCalibration) -> Result:
+    """The result of one run."""
 
     def page() -> str:
-        from inercal.faces.report.coefficients import repeats
-        from inercal.faces.report.html import render
         from inercal.systems.strapdown import figures
 
-        if len(calibrated) == 1:
-            return figures.page(calibrated[0])
-        return render(shown, repeats(shown), "Calibration of a strapdown unit, repeat runs")
+        return figures.page(calibration)
 
-    evidence = calibrated[0] if len(calibrated) == 1 else tuple(calibrated)
-    return Result(estimate, of_coefficients(shown, page), evidence)
+    return Result(calibration.estimate, of_coefficients(calibration.estimate.shown(), page), calibration)
 
 
 def prepare_design(study: Study) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from inercal.faces.python.result import Result, View, of_coefficients
-from inercal.faces.python.study import Progress, Study, calibrations, designed_by
+from inercal.faces.python.study import Progress, Study, designed_by, of_runs
 from inercal.foundation.computing.executors import Executor
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate, without_coefficients
@@ -27,10 +27,19 @@ def calibrate(
     Parameters and errors are those of `inercal.calibrate`; there is nothing to ``compare``. Of repeat runs
     ``evidence`` has a calibration for each.
     """
-    calibrated: list[Any] = calibrations(records, study, progress, task.calibrate)
-    if len(calibrated) > 1:
-        return _combined(calibrated, records[0])
-    (calibration,) = calibrated
+    title = "Repeat runs on a turntable"
+    return of_runs(records, study, progress, task.calibrate, _one, title, _displayed)
+
+
+def _displayed(estimate: Estimate, first: Any) -> Estimate:
+    """The estimate of repeat runs in the unit of the first."""
+    from inercal.systems.turntable.display import displayed
+
+    return displayed(estimate, first.readings.unit)
+
+
+def _one(calibration: Any) -> Result:
+    """The result of one run."""
 
     def page() -> str:
         from inercal.systems.turntable import figures
@@ -43,24 +52,6 @@ def calibrate(
         return [tolerances(calibration.estimate)]
 
     return Result(calibration.estimate, of_coefficients(calibration.shown, page, more), calibration)
-
-
-def _combined(calibrated: Sequence[Any], first: Record) -> Result:
-    """The result of repeat runs."""
-    from inercal.faces.python.study import with_span
-    from inercal.foundation.results.repeat import combine_runs
-    from inercal.systems.turntable.display import displayed
-
-    estimate = with_span(combine_runs([each.estimate for each in calibrated]), first)
-    shown = displayed(estimate, calibrated[0].readings.unit)
-
-    def page() -> str:
-        from inercal.faces.report.coefficients import repeats
-        from inercal.faces.report.html import render
-
-        return render(shown, repeats(estimate), "Repeat runs on a turntable")
-
-    return Result(estimate, of_coefficients(shown, page), tuple(calibrated))
 
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
