@@ -86,7 +86,7 @@ def _live(settings: StrapdownSettings, interval: float, output: ResultOutput) ->
     """Prepare a calibration rest by rest."""
     from inercal.faces.stream.estimators import strapdown as prepared
 
-    return prepared(settings, output.say, output.say_finding)
+    return prepared(settings, interval, output.say, output.say_finding)
 
 
 def calibrate_turntable(
