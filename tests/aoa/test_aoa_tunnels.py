@@ -16,7 +16,7 @@ from inercal.systems.aoa.diagnosis.examination import diagnose, implausible
 from inercal.systems.aoa.diagnosis.gyro_scale import alone
 from inercal.systems.aoa.diagnosis.small import further_ahead, with_axis
 from inercal.systems.aoa.diagnosis.spectrum import of_rectification
-from inercal.systems.aoa.diagnosis.unseen import unseen
+from inercal.systems.aoa.diagnosis.unmodelled import unmodelled
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.reading.recording import plain
@@ -264,7 +264,7 @@ def test_in_vibration_the_angle_is_good_and_u_is_its_size(kind, smoothed):
 
 def told(recording, words, settings=study()):  # noqa: B008  (frozen)
     """The findings on what nothing shows that hold ``words``."""
-    return [each for each in unseen(recording, problem(settings), settings) if words in each.message]
+    return [each for each in unmodelled(recording, problem(settings), settings) if words in each.message]
 
 
 def test_a_bias_that_drifts_unnoticed_is_told_with_what_it_costs():
@@ -328,7 +328,7 @@ def test_a_gyro_that_is_no_such_gyro_has_a_wider_prior_and_u_holds():
         k = of.names.index("k_g")
         assert abs(found.state.x[k] - 0.01) < 4.0 * np.sqrt(found.state.P[k, k])
     assert np.mean(squares) < 13.8 / SEEDS
-    (said,) = unseen(recording, problem(study()), study())
+    (said,) = unmodelled(recording, problem(study()), study())
     assert said.code == "prior_suspect"
     assert said.harm
 
@@ -350,7 +350,7 @@ def test_another_error_is_not_taken_for_a_scale_of_the_gyro(change, words):
     recording = plain(run.t, run.acc, run.gyro)
     settings = decided(recording, stated)
     assert settings.prior.gyro_scale == stated.prior.gyro_scale
-    found = diagnose(recording, settings) or unseen(recording, problem(settings), settings)
+    found = diagnose(recording, settings) or unmodelled(recording, problem(settings), settings)
     (said,) = (each for each in found if each.harm)
     assert re.search(words, str(said.to_json()))
 

@@ -2,9 +2,6 @@
 
 import io
 import json
-import os
-import signal
-import subprocess
 import sys
 from pathlib import Path
 from typing import get_args
@@ -21,9 +18,7 @@ from rows import for_each
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
-POSIX = pytest.mark.skipif(os.name == "nt", reason="signals and pipes as on POSIX")
 AOA = ["aoa", "model.csv", "--study", "aoa.toml"]
-SUFFIXES = [".csv", ".npz", ".h5", ".parquet", ".nc"]
 NAMES = ["b_g", "b_1", "b_2", "b_3", "dr_1", "dr_2", "dr_3", "zo_1", "zo_2", "zo_3", "k_g", "tau_g"]
 
 
@@ -110,24 +105,10 @@ def test_json_is_the_contract_and_holds_the_truth(capsys):
     assert {"accelerometer noise", "gyro noise", "lever arms"} <= {item["source"] for item in data["budget"]}
 
 
-def test_people_see_units_of_the_field_and_get_their_files(capsys):
-    assert run([*AOA, "--out", "result.toml", "--report", "model.html"]) == 0
-    captured = capsys.readouterr()
-    for words in ("deg/h", "ug", "mm", "ppm", "ok: ", "A delay that all sensors have in common"):
-        assert words in captured.out
-    assert "model.html" in captured.err
-    assert Path("model.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
-    assert list(load("result.toml").names) == NAMES
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_samples_in_every_kind_of_file(suffix, capsys):
-    """One row for each of the record, columns as agreed; the angle is the truth to a hundredth of a degree or so."""
-    assert run([*AOA, "--out", f"angles{suffix}", "--quiet"]) == 0
+def test_samples_have_a_row_each(capsys):
+    """Columns as agreed; the angle is the truth to a hundredth of a degree or so."""
+    assert run([*AOA, "--out", "angles.csv", "--quiet"]) == 0
     assert capsys.readouterr().err == ""
-    if suffix != ".csv":
-        assert Path(f"angles{suffix}").stat().st_size > 1500 * 4 * 8
-        return
     assert (
         Path("angles.csv")
         .read_text()
@@ -262,33 +243,6 @@ def test_files_with_distinct_channels_are_one_record(capsys):
 # Live.
 
 
-@pytest.mark.parametrize(
-    ("how", "low_pass"),
-    [
-        ([], "none"),
-        ([], "50 Hz"),
-        (["--states", "8"], "none"),
-        (["--states", "8"], "50 Hz"),
-        (["--set", "model.roll=5.0(2) deg"], "50 Hz"),
-        pytest.param(["--set", "model.roll=5.0(2) deg"], "none", marks=pytest.mark.campaign),
-    ],
-)
-def test_a_stream_gives_the_bytes_of_the_file(how, low_pass, capsys, monkeypatch):
-    """Where the study states band and snap; with status and NIS beside."""
-    how = [*how, "--set", f"band.low_pass={low_pass}", "--set", "estimator.snap=1e8 rad^2/s^7"]
-    assert run([*AOA, *how, "--out", "angles.csv", "--quiet"]) in (0, 1)
-    code, out, err = piped(monkeypatch, capsys, "aoa", "--stream", *AOA[2:], *how, "--quiet")
-    assert (code, err) == (0, "")
-    assert out == Path("angles.csv").read_text()
-    assert {line.split(",")[5] for line in out.splitlines()} <= {"status [1]", "0.0", "2.0"}
-
-
-def test_a_stream_from_a_file_a_line_a_second(capsys):
-    assert run([*AOA, "--stream", "--every", "1 s", "--quiet"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [float(line.split(",")[0]) for line in lines[1:]] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-
-
 def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     stream = ["aoa", "--stream", *AOA[2:], "--states", "8", "--set", "noise.accelerometer=1e-6 g"]
     stream += ["--set", "band.low_pass=none", "--set", "estimator.snap=1e7 rad^2/s^7"]
@@ -298,65 +252,22 @@ def test_an_alarm_is_said_while_the_stream_goes_on(capsys, monkeypatch):
     assert "the stream contradicts the model: mean NIS" in err
 
 
-@pytest.mark.campaign
-@POSIX
-def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
-    """Killed without warning, while it works: each row is answered, and always with the same digits."""
-    command = ["aoa", "--stream", *AOA[2:], "--quiet"]
-    assert run([*command[:1], "model.csv", *command[1:]]) == 0
-    whole = capsys.readouterr().out.encode().splitlines(keepends=True)
-    saving = ["--checkpoint", str(tmp_path / "state"), "--checkpoint-every", "17"]
-    given = []
-    for lines in (*np.random.default_rng(11).integers(30, 700, 2), None):
-        with open("model.csv", "rb") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "inercal", *command, *saving], stdin=log, stdout=subprocess.PIPE
-            )
-        if lines is not None:
-            given += [process.stdout.readline() for _ in range(lines)]
-            process.send_signal(signal.SIGKILL)
-        given += process.stdout.readlines()
-        process.stdout.close()
-        assert process.wait(60) == (0 if lines is None else -signal.SIGKILL)
-        if not given[-1].endswith(b"\n"):
-            given.pop()  # killed in the middle of a line
-    assert set(given) == set(whole)
-    assert list(dict.fromkeys(given)) == whole
-
-
 # What is refused.
 
 
 @for_each(
     ("arguments", "words"),
     [
-        (["aoa", "none.csv", *AOA[2:]], ["none.csv"]),
-        (["aoa", "model.csv"], ["--study"]),
-        (["aoa", *AOA[2:]], ["FILES is missing", "--stream"]),
         ([*AOA, "--static", "kalman"], ["kalman", "improved"]),
         ([*AOA, "--states", "9"], ["9", "19"]),
         ([*AOA, "--smooth", "--static", "segmented"], ["--smooth", "--static"]),
         ([*AOA, "--states", "8", "--tangential", "dual"], ["--states", "--tangential"]),
-        ([*AOA, "--out", "cal.txt"], ["cal.txt", "'.txt'", ".json"]),
-        ([*AOA, "--out", "model.csv"], ["is an input"]),
-        ([*AOA, "--report", "cal.pdf"], [".html"]),
-        ([*AOA, "--every", "1 s"], ["--every", "--stream"]),
-        ([*AOA, "--checkpoint", "c"], ["--checkpoint", "--stream"]),
-        ([*AOA, "--stream", "--json"], ["--json", "stream"]),
-        ([*AOA, "--stream", "--out", "x.csv"], ["--out", "stream"]),
-        ([*AOA, "--stream", "--report", "x.html"], ["--report", "stream"]),
-        ([*AOA, "--stream", "--compare"], ["--compare", "stream"]),
         ([*AOA, "--stream", "--smooth"], ["--smooth", "stream"]),
         ([*AOA, "--stream", "--points"], ["--points", "stream"]),
         ([*AOA, "--stream", "--centrifugal", "decision"], ["--centrifugal", "stream", "fusion", "files"]),
         ([*AOA, "--stream", "--set", "estimator.smooth=true"], ["aoa.toml", "estimator.smooth", "past"]),
         ([*AOA, "--stream", "--set", "estimator.kind=paper"], ["aoa.toml", "estimator.kind", "files"]),
-        ([*AOA, "--stream", "--every", "0 s"], ["--every", "above 0"]),
-        ([*AOA, "--stream", "--checkpoint", "model.csv"], ["is an input"]),
-        (["aoa", "model.csv", "pauses.csv", *AOA[2:], "--stream"], ["--stream", "2 files"]),
         (["aoa", "model.csv", "pauses.csv", *AOA[2:]], ["pauses.csv", "model.csv", "estimator.prior"]),
-        (["aoa", "model.csv", "--study", "selfcal.toml"], ["selfcal.toml", "rig.kind", "selfcal"]),
-        (["aoa", "model.csv", "--study", "model.csv"], ["model.csv"]),
         ([*AOA, "--set", "sensors.a1.axis=+y"], ["sensors.a1.axis", "+y"]),
         ([*AOA, "--set", "estimator.prior=none.json"], ["none.json"]),
         ([*AOA, "--set", "estimator.prior=p.json", "--out", "p.json"], ["p.json", "is an input"]),
@@ -369,19 +280,16 @@ def test_killed_at_any_moment_and_restarted(capsys, tmp_path):
         (["aoa", "counts.csv", *AOA[2:], "--stream"], ["counts.csv", "a1 is in count", "scale"]),
         (["aoa", "one_axis.csv", *AOA[2:], "--stream"], ["one_axis.csv", "a2"]),
         (["aoa", "ten.csv", *AOA[2:]], ["ten.csv", "10 rows"]),
-        (["aoa", "noise.bin", *AOA[2:]], ["noise.bin"]),
     ],
 )
 def test_bad_input_is_one_sentence_and_nothing_is_written(arguments, words, capsys, folder):
     text = Path("model.csv").read_text()
     rows = [line.split(",") for line in text.splitlines()]
     if not Path("ten.csv").exists():
-        run(["new", "selfcal", "--out", "selfcal.toml", "--quiet", *FILL])
         Path("gyro_only.csv").write_text("".join(f"{row[0]},{row[4]}\n" for row in rows))
         Path("one_axis.csv").write_text("".join(f"{row[0]},{row[1]},{row[3]},{row[4]}\n" for row in rows))
         Path("counts.csv").write_text(text.replace("a1 [g]", "a1 [count]"))
         Path("ten.csv").write_text("".join(",".join(row) + "\n" for row in rows[:11]))
-        Path("noise.bin").write_bytes(np.random.default_rng(1).bytes(4000))
     before = sorted(path.name for path in folder.iterdir())
     for more in ([], ["--json"] if "--stream" not in arguments else []):
         capsys.readouterr()

@@ -124,10 +124,6 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
         (["sensitivity", "twice.toml"], ["twice.toml: line 8: default is given a second time"]),
         (["sensitivity", "t.toml", "--out", "m.csv"], ["m.csv", "expected .json or .toml or .nc or .npz"]),
         (["sensitivity", "imu.toml"], ["a study for `inercal calibrate imu`"]),
-        (["calibrate", "imu", "log.csv", "--study", "t.toml"], ["a study for `inercal calibrate turntable`"]),
-        (["simulate", "turntable", "t.toml"], ["--out: missing"]),
-        (["simulate", "turntable", "t.toml", "--out", "t.toml"], ["found the suffix '.toml'"]),
-        (["simulate", "turntable", "t.toml", "--seed", "-1", "--out", "x.csv"], ["--seed: found -1"]),
         (["design", "positions", "t.toml", "--out", "p.nc"], ["p.nc", "expected .json or .toml or .csv"]),
         (["design", "positions", "t.toml", "--set", "design.compare=['x']"], ["design.compare.0: found 'x'"]),
         (
@@ -158,14 +154,9 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
             ],
         ),
         (
-            ["calibrate", "turntable", "volts.csv"],
-            ["error: calibrate turntable: --study is missing, expected it (Study file (TOML)"],
-        ),
-        (
             ["calibrate", "turntable", "volts.csv", "--study"],
             ["found nothing after --study, expected a value"],
         ),
-        (["calibrate", "turntable"], ["FILES is missing, expected it (Recordings"]),
         (
             ["sensitivity", "t.toml", "--set", "rig.errors.default.uniform=2 arcmn"],
             [
@@ -178,8 +169,6 @@ def test_flagged_positions_leave_the_status_ok(folder, capsys):
         ),
         (["design"], ["design: found no kind, expected positions"]),
         (["simulate"], ["simulate: found no kind, expected turntable"]),
-        (["calibrate", "turntable", "no.csv", "--study", "t.toml"], ["no.csv"]),
-        (["calibrate", "turntable", "t.toml", "--study", "t.toml"], ["t.toml"]),
     ],
 )
 def test_bad_studies_and_usage_get_one_line(arguments, words, folder, capsys):
@@ -197,16 +186,6 @@ def test_bad_studies_and_usage_get_one_line(arguments, words, folder, capsys):
     assert sorted(folder.iterdir()) == before
 
 
-def test_the_seed_makes_the_recording(folder, capsys):
-    for seed, name in ((5, "a.csv"), (5, "b.csv"), (6, "c.csv")):
-        assert run(["simulate", "turntable", "t.toml", "--seed", str(seed), "--out", name]) == 0
-    a, b, c = (Path(name).read_text() for name in ("a.csv", "b.csv", "c.csv"))
-    assert a == b != c
-    head = a.splitlines()[0].split(",")
-    assert {"phi1 [deg]", "phi2 [deg]", "y_x [deg/h]"} <= set(head)
-    assert len(a.splitlines()) == 37
-
-
 def test_a_simulated_recording_is_calibrated_to_its_truth(folder, capsys):
     """The true coefficients lie within five standard uncertainties; per g^2 at 9.8 m/s^2 is (9.8/9.80665)^2."""
     assert run(["simulate", "turntable", "t.toml", "--seed", "2", "--out", "r.csv", "--quiet"]) == 0
@@ -222,15 +201,6 @@ def test_a_simulated_recording_is_calibrated_to_its_truth(folder, capsys):
     assert set(data["timing_s"]) == {"read", "solve", "total"}
     assert {source["path"] for source in data["inputs"]} == {"r.csv", "t.toml"}
     assert json.loads(Path("cal.json").read_text())["parameters"] == data["parameters"]
-
-
-def test_people_see_the_unit_of_the_record(folder, capsys):
-    run(["simulate", "turntable", "t.toml", "--seed", "2", "--out", "r.csv", "--quiet"])
-    capsys.readouterr()
-    assert run(["calibrate", "turntable", "r.csv", "--study", "t.toml"]) == 0
-    row = next(line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("DX_F"))
-    assert row[-1] == "deg/h"
-    assert float(row[1]) == pytest.approx(50.0, abs=1.0)
 
 
 def test_an_unidentified_term_ends_unobservable_with_its_null_vector(folder, capsys):
@@ -373,18 +343,3 @@ def test_a_rate_test_is_simulated_and_calibrated(folder, capsys):
     found = next(p for p in data["parameters"] if p["name"] == "S_z")
     assert abs(found["value"] - 1.001) < 5 * found["u"] < 1e-3
     assert Path("r.html").exists()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["sensitivity", "t.toml"],
-        ["design", "positions", "t.toml"],
-        ["calibrate", "turntable", "r.csv", "--study", "t.toml"],
-    ],
-)
-def test_reports(command, folder, capsys):
-    run(["simulate", "turntable", "t.toml", "--out", "r.csv", "--quiet"])
-    assert run([*command, "--report", "r.html", "--quiet"]) == 0
-    assert Path("r.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")

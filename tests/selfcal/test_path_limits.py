@@ -11,7 +11,7 @@ import inercal as ic
 from inercal.foundation.errors import StudyError
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.before.path_design import design
-from inercal.systems.selfcal.before.path_search import criterion, left_out, search, shifts
+from inercal.systems.selfcal.before.path_search import criterion, search, shifts, unmodelled
 from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -143,7 +143,7 @@ class Silent:
 def test_shifts_by_errors_left_out_are_those_of_the_filter():
     """Two records without noise, with K2 and without: what the filter makes of them differs by what is said before."""
     asked = study("best", search=Search(robust=("k2",)))
-    of, sizes = left_out(asked), 1e-3
+    of, sizes = unmodelled(asked), 1e-3
     told = shifts(motion(asked.plan, asked.world), problem(asked), of)
     assert of.names == ("K2_x", "K2_y", "K2_z")
     plain = experiment(asked)
@@ -168,7 +168,7 @@ def test_errors_left_out_count_in_the_criterion(monkeypatch):
     def judged(plan):
         """Variance of the shifts (18,), and the criterion."""
         along = motion(plan, asked.world)
-        shifted = np.square(shifts(along, problem(asked), left_out(asked))).sum(axis=1)
+        shifted = np.square(shifts(along, problem(asked), unmodelled(asked))).sum(axis=1)
         ratio = np.sqrt(bounds(along, problem(asked)).u ** 2 + shifted) / asked.prior[:18]
         return shifted, np.exp(np.log(ratio).mean())
 

@@ -15,7 +15,7 @@ from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import EXTENDED, to_linear
 from inercal.systems.selfcal.reading import recording_of
-from inercal.systems.selfcal.result.not_fitted import Evidence, of_all
+from inercal.systems.selfcal.result.unmodelled import Evidence, of_all
 from inercal.systems.selfcal.several import fit, parts_of, placed
 
 ONE = Drive((("z", 360), ("z", -360)), rate=np.radians(2.0))

@@ -185,10 +185,3 @@ def test_a_plan_is_needed_to_simulate(folder, capsys):
     assert run(["simulate", "strapdown", "bare.toml", "--out", "none.csv"]) == 2
     said_once(capsys.readouterr(), "bare.toml", "plan: missing")
     assert not (folder / "none.csv").exists()
-
-
-def test_repeat_runs_are_combined(folder, capsys):
-    capsys.readouterr()
-    assert run(["simulate", "strapdown", "strapdown.toml", "--seed", "4", "--out", "two.npz", "--quiet"]) == 0
-    both = ic.calibrate([ic.read("run.npz"), ic.read("two.npz")], "strapdown.toml")
-    assert len(both.evidence) == 2

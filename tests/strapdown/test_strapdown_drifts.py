@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from inercal.systems.strapdown.noise.left_out import Candidate, Posed, told_apart
-from inercal.systems.strapdown.noise.left_out import tests as left_out
+from inercal.systems.strapdown.noise.unmodelled import Candidate, Posed, told_apart
+from inercal.systems.strapdown.noise.unmodelled import tests as unmodelled
 
 ROWS, COEFFICIENTS = 400, 4
 SENSORS = {0: "one", 1: "other"}
@@ -95,4 +95,4 @@ def test_one_drift_alone_and_none():
     assert [each.candidate.name for each in told_apart(made, {1: "other"})] == ["other"]
     assert told_apart(made, {}) == []
     nothing = made._replace(candidates=[], places=[])
-    assert left_out(nothing) == []
+    assert unmodelled(nothing) == []

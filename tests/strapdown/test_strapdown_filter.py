@@ -155,23 +155,6 @@ def test_a_stream_says_after_each_rest_what_a_file_says(live, capsys):
             assert line[names.index(f"u_{name}")] == pytest.approx(u, rel=0.02), name
 
 
-def test_a_stream_goes_on_where_it_was_stopped(live, tmp_path, capsys):
-    study, record = live
-    lines = Path(record).read_bytes().splitlines(keepends=True)
-    (tmp_path / "part.csv").write_bytes(b"".join(lines[: len(lines) // 2]))
-    command = ["calibrate", "strapdown", "--study", study, "--stream", "--quiet"]
-    capsys.readouterr()
-    assert run([*command, record]) == 0
-    whole = capsys.readouterr().out.splitlines()
-    saved = ["--checkpoint", str(tmp_path / "state")]
-    assert run([*command, str(tmp_path / "part.csv"), *saved]) == 0
-    first = capsys.readouterr().out.splitlines()
-    assert run([*command, record, *saved]) == 0
-    second = capsys.readouterr().out.splitlines()
-    rows = {line.partition(",")[0]: line for line in (*first, *second)}
-    assert list(rows.values())[-2:] == whole[-2:]
-
-
 @pytest.mark.kernels
 def test_what_a_stream_does_not_take_is_said(live, tmp_path, capsys):
     study, record = live

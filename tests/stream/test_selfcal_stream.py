@@ -341,8 +341,8 @@ def test_an_accelerometer_without_a_scale_is_said(tmp_path):
     step = estimator.step
 
     def without_scale(state, sample):
-        if state.begun:
-            state.filter.coefficients[KA1.start + 1] = -1.0
+        if state.system.begun:
+            state.system.filter.coefficients[KA1.start + 1] = -1.0
         state, out = step(state, sample)
         told.extend(dict(zip(estimator.columns, line, strict=True)) for line in out)
         return state, out

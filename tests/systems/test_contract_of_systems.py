@@ -1,39 +1,30 @@
 """Each system through all that its record offers, on a recording of its own new study: nothing here knows a system."""
 
-import functools
-import io
+import contextlib
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
-from new_studies import filled
+from new_studies import FILL
 
 import inercal as ic
 from inercal.bench.workbench.pages.form import lines_of, named, with_lines
 from inercal.cli import run
 from inercal.cli.tree import COMMANDS
 from inercal.faces.python.study import kind_of, read_study
-from inercal.faces.stream import run as stream
 from inercal.faces.stream.estimators import of_study
-from inercal.faces.stream.lines import Lines
 from inercal.faces.studies.schema import json_schema
 from inercal.faces.studies.text import parsed, with_keys
-from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.errors import InputError, QuantityError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.records.write import write_record
+from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
 from inercal.systems.listed import SYSTEMS
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("undrawn")]
 
-#: keys that make the test of a new study short
-SHORT = {
-    "turntable": ("positions.plan=24-position", 'goal={ DX_F = "1 deg/h" }', "design.positions=12"),
-    "selfcal": ("design.turns=1",),
-    "strapdown": ("plan.sample_rate=25 Hz",),
-    "aoa": ("motion.duration=12 s", "motion.sample_rate=250 Hz"),
-}
 KEYS = [
     "inercal", "command", "status", "parameters", "covariance", "findings", "statistics", "budget", "model",
     "conditions", "traceability", "inputs", "timing_s", "provenance",
@@ -45,24 +36,6 @@ def those_with(offer):
     return pytest.mark.parametrize(
         "kind", [kind for kind, system in SYSTEMS.items() if getattr(system, offer)]
     )
-
-
-@pytest.fixture(scope="module")
-def test_of(tmp_path_factory):
-    """Of a kind: the folder of study and recording, the study, the record, the result; made once."""
-    root = tmp_path_factory.mktemp("systems")
-
-    @functools.cache
-    def made(kind):
-        folder = root / kind
-        folder.mkdir()
-        (folder / "study.toml").write_text(filled(kind, overrides=SHORT.get(kind, ())))
-        study = read_study(kind, folder / "study.toml")
-        write_record(ic.simulate(study, np.random.default_rng(1)), folder / "log.csv")
-        record = ic.read(folder / "log.csv")
-        return folder, study, record, ic.calibrate(record, study)
-
-    return made
 
 
 @every_system
@@ -91,6 +64,91 @@ def test_a_simulation_is_drawn_from_its_generator_alone(kind, test_of):
     for name, column in again.columns.items():
         np.testing.assert_allclose(column.values, record[name].values, rtol=1e-9, atol=1e-12)
     assert any(np.any(again[name].values != other[name].values) for name in again.columns)
+
+
+def refused(capsys, words, says):
+    """Exit code 2, nothing on standard output, one sentence that says so on standard error."""
+    capsys.readouterr()
+    assert run([*map(str, words)]) == 2, words
+    said = capsys.readouterr()
+    assert said.out == ""
+    (line,) = said.err.replace("compiling kernels, once\n", "").splitlines()
+    assert line.startswith("inercal: error: ")
+    assert says in line
+
+
+@every_system
+def test_the_command_simulates_what_the_verb_does(kind, test_of, tmp_path, capsys):
+    folder, study, record, _ = test_of(kind)
+    words = ["simulate", kind, folder / "study.toml"]
+    out = tmp_path / "by_command.csv"
+    assert run([*map(str, [*words, "--seed", 2, "--out", out, "--json", "--quiet"])]) == 0
+    made = json.loads(capsys.readouterr().out)
+    rows = len(next(iter(record.columns.values())).t)
+    assert (made["command"], made["status"]["code"]) == (f"simulate {kind}", "ok")
+    assert made["result"] == {"out": str(out), "rows": rows, "seed": 2, "columns": list(record.columns)}
+    assert made["inputs"][0]["path"] == str(folder / "study.toml")
+    write_record(ic.simulate(study, np.random.default_rng(2)), tmp_path / "by_verb.csv")
+    assert out.read_bytes() == (tmp_path / "by_verb.csv").read_bytes()
+    before = sorted(tmp_path.iterdir())
+    (other,) = [name for name in SYSTEMS if name != kind][:1]
+    for more, says in (
+        ([], "--out"),
+        (["--out", tmp_path / "run.xlsx"], "'.xlsx'"),
+        (["--out", tmp_path / "run.csv", "--seed", "-1"], "--seed: found -1"),
+    ):
+        refused(capsys, [*words, *more], says)
+    words = ["simulate", other, folder / "study.toml", "--out", tmp_path / "run.csv"]
+    refused(capsys, words, f"a study for `inercal {SYSTEMS[kind].command}`")
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@every_system
+def test_new_writes_a_study_for_a_recording_and_overwrites_none(kind, test_of, tmp_path, capsys):
+    folder, study, record, _ = test_of(kind)
+    words = ["new", kind, folder / "log.csv", "--out", tmp_path / "new.toml", *FILL]
+    assert run([*map(str, words), "--json", "--quiet"]) == 0
+    made = json.loads(capsys.readouterr().out)["result"]
+    assert made["study"] == str(tmp_path / "new.toml")
+    assert (made["map"] is None) == SYSTEMS[kind].complete(record.columns)
+    text = (tmp_path / "new.toml").read_text()
+    assert f"# Next: inercal {SYSTEMS[kind].command} {folder / 'log.csv'}" in text
+    assert type(read_study(kind, tmp_path / "new.toml").settings) is type(study.settings)
+    refused(capsys, words, "exists already")
+
+
+@every_system
+def test_what_cannot_be_used_is_one_sentence_and_nothing_is_written(kind, test_of, tmp_path, capsys):
+    folder, _, _, _ = test_of(kind)
+    log, study = folder / "log.csv", ("--study", folder / "study.toml")
+    text = log.read_text().splitlines()
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "header.csv").write_text(text[0] + "\n")
+    (tmp_path / "warm.csv").write_text("t [s],temperature [degC]\n0,20\n1,20\n2,21\n")
+    (tmp_path / "noise.bin").write_bytes(np.random.default_rng(1).bytes(4000))
+    before = sorted(tmp_path.iterdir())
+    words = SYSTEMS[kind].command.split()
+    tried = [
+        ((tmp_path / "none.csv", *study), "none.csv"),
+        ((tmp_path / "empty.csv", *study), "empty.csv"),
+        ((tmp_path / "header.csv", *study), "header.csv"),
+        ((tmp_path / "warm.csv", *study), "warm.csv"),
+        ((tmp_path / "noise.bin", *study), "noise.bin"),
+        ((log,), "--study"),
+        ((log, "--study", tmp_path / "none.toml"), "none.toml"),
+        ((log, "--study", log), "log.csv"),
+        ((log, *study, "--set", "site.gravty=9.81 m/s^2"), "gravity"),
+        ((log, *study, "--set", "site.gravity=9.81 deg"), "site.gravity"),
+        ((log, *study, "--out", tmp_path / "cal.txt"), ".json"),
+        ((log, *study, "--out", folder / "study.toml"), "is an input"),
+        ((log, *study, "--report", tmp_path / "page.pdf"), ".html"),
+        ((log, *study, "--begin", "1e9 s"), "--begin"),
+        ((log, *study, "--nonesuch"), "--nonesuch"),
+    ]
+    for arguments, says in tried:
+        refused(capsys, [*words, *arguments], says)
+        refused(capsys, [*words, *arguments, "--json"], says)
+    assert sorted(tmp_path.iterdir()) == before
 
 
 @every_system
@@ -156,46 +214,74 @@ def test_a_result_is_shown_saved_and_loaded_whatever_its_verdict(kind, spoilt, t
 
 @every_system
 def test_a_page_and_its_pictures_stand_at_every_verdict(kind, test_of, tmp_path):
+    """That of the calibration, which has its evidence, and that of a saved result."""
     _, _, _, result = test_of(kind)
     saved = json.loads(result.save(tmp_path / "cal.json").read_text())
-    for status in Status:
-        verdict = {"code": status.value, "message": "the verdict in a sentence"}
-        (tmp_path / "other.json").write_text(json.dumps({**saved, "status": verdict}))
-        again = ic.load(tmp_path / "other.json")
-        assert again.status is status
-        assert "the verdict in a sentence" in again.view.page()
-        assert again.plot().axes
+    found = {id(each): each for each in (result.estimate, result.view.shown, result.evidence.estimate)}
+    was = result.status, result.message
+    try:
+        for status in Status:
+            for estimate in found.values():
+                object.__setattr__(estimate, "status", status)
+                object.__setattr__(estimate, "message", "the verdict in a sentence")
+            assert "the verdict in a sentence" in result.view.page()
+            assert result.plot().axes
+            if status not in (Status.OK, Status.UNOBSERVABLE):
+                continue
+            verdict = {"code": status.value, "message": "the verdict in a sentence"}
+            (tmp_path / "other.json").write_text(json.dumps({**saved, "status": verdict}))
+            again = ic.load(tmp_path / "other.json")
+            assert again.status is status
+            assert "the verdict in a sentence" in again.view.page()
+            assert again.plot().axes
+    finally:
+        for estimate in found.values():
+            object.__setattr__(estimate, "status", was[0])
+            object.__setattr__(estimate, "message", was[1])
 
 
-def streamed(study, lines, checkpoint=None):
-    """Lines that the estimator of a study gives for lines."""
-    made = []
-    given = Lines(io.BytesIO("".join(lines).encode()), "lines", None, lambda finding: None)
-    estimator = of_study(study, 0.0, lambda text: None, lambda finding: None)(given)
-    saving = None if checkpoint is None else stream.Saving(checkpoint, 100)
-    stream.run(estimator, given, made.append, saving, lambda text: None, -np.inf)
-    return made
+@every_system
+def test_the_budget_adds_up_and_units_are_those_they_say(kind, test_of):
+    """Shares of the sources are the whole of each variance; a value in its unit is the one in SI."""
+    _, _, _, result = test_of(kind)
+    estimate, shown = result.estimate, result.view.shown
+    for name in estimate.names:
+        assert sum(item.share.get(name, 0.0) for item in estimate.budget) == pytest.approx(1.0, abs=1e-4), (
+            name
+        )
+    checked = 0
+    for name, unit, value, si in zip(estimate.names, shown.units, shown.values, estimate.values, strict=True):
+        plain, per, power = unit.partition("/g")
+        with contextlib.suppress(QuantityError):  # a unit of the field alone
+            size = value * parse_unit(plain).factor
+            by_gravity = size / STANDARD_GRAVITY ** float(power.lstrip("^") or 1) if per else size
+            assert si in (pytest.approx(size, rel=5e-3), pytest.approx(by_gravity, rel=5e-3)), name
+            checked += 1
+    assert checked or not estimate.names
 
 
-@those_with("stream")
-def test_a_stream_gives_the_numbers_of_the_file_however_often_it_is_stopped(kind, test_of, tmp_path):
-    folder, study, _, result = test_of(kind)
-    lines = (folder / "log.csv").read_text().splitlines(keepends=True)
-    whole = streamed(study, lines)
-    assert len(whole) > 2
-    state = tmp_path / "state"
-    parts = [*streamed(study, lines[: 1 + len(lines) // 2], state), *streamed(study, lines, state)]
-    last = {line.split(",")[0]: line for line in parts}  # what an end gave too early is given once more
-    assert [last[line.split(",")[0]] for line in whole] == whole
-    if result.view.rows is None:
+@every_system
+def test_repeat_runs_are_one_result_or_refused(kind, test_of, tmp_path):
+    _, study, record, result = test_of(kind)
+    other = ic.simulate(study, np.random.default_rng(2))
+    try:
+        both, refusal = ic.calibrate([record, other], study), ""
+    except InputError as error:
+        both, refusal = None, str(error)
+    if both is None:
+        assert "expected one run" in refusal
         return
-    rows = result.view.rows()
-    names = [name.split(" [")[0] for name in whole[0].split(",")]
-    last = {name: float(word or "nan") for name, word in zip(names, whole[-1].split(","), strict=True)}
-    shared = [name for name in names if name in rows.columns and f"u_{name}" in names]
-    assert shared
-    for name in shared:  # a file is gone through a second time, with what the first has found
-        assert rows[name].values[-1] == pytest.approx(last[name], rel=0, abs=0.5 * last[f"u_{name}"]), name
+    alone = ic.calibrate(other, study)
+    if not (result.status.done and alone.status.done):
+        assert not both.status.done
+        return
+    assert len(both.evidence) == 2
+    by_run = both.estimate.result["by_run"]
+    for name in both.names:
+        assert by_run[name]["values"] == [result.values[name], alone.values[name]]
+        low, high = sorted(by_run[name]["values"])
+        assert low - 1e-9 * abs(low) <= both.values[name] <= high + 1e-9 * abs(high)
+    assert both.report(tmp_path / "page.html").stat().st_size > 10_000
 
 
 @every_system

@@ -16,15 +16,16 @@ they come.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from inercal.faces.stream.aoa_state import AoaState, Leaning, Sensors, choice_of, chosen, kept, watched_limits
+from inercal.faces.stream.aoa_state import AoaState, Leaning, Sensors, choice_of, chosen, watched_limits
 from inercal.faces.stream.lines import Lines, Sample
-from inercal.faces.stream.run import Alarms, Output, Slots
+from inercal.faces.stream.shell import Rows, StreamRow, SystemOnStream
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import EVERYTHING, Finding
@@ -47,16 +48,12 @@ from inercal.systems.aoa.result.systematic import gravity_u, leaning, leans, wid
 from inercal.systems.aoa.result.verdict import nis_limit
 from inercal.systems.aoa.settings import AoaSettings
 
-# bits of `AoaState.alarms`; from the last on one for each sensor
-_CONTRADICTION, _SILENCE, _SATURATED = range(3)
-
 _STATUS = 4
 """Place of the status in a row of `inercal.systems.aoa.result.columns`."""
 
 
-class Aoa:
-    """Measures angles row by row (`inercal.faces.stream.run.Recursive`); columns as
-    `inercal.systems.aoa.result.columns` has them.
+class Aoa(SystemOnStream[AoaState]):
+    """Measures angles row by row; columns as `inercal.systems.aoa.result.columns` has them.
 
     Parameters
     ----------
@@ -87,22 +84,23 @@ class Aoa:
         every: float = 0.0,
         say: Callable[[Finding], None] = lambda _: None,
     ) -> None:
+        super().__init__(every, say)
         posterior = None
         if (prior := settings.estimator.prior) is not None:
             posterior, settings = load_posterior(prior, settings), corrected(prior, settings)
-        self._settings, self._every, self._say, self._where = settings, every, say, lines.where
+        self._settings, self._where = settings, lines.where
         self._sensors = Sensors(lines, settings)
         self._posterior, self._spatial = posterior, self._sensors.spatial
         named = [("t", "s"), *columns(settings)]
         self.columns = [f"{name} [{unit}]" for name, unit in named]
         self._changes = leans(settings, self._spatial)
         self._pose(settings)
-        self._after: AoaState | None = None
+        self._last: AoaState | None = None
         self.failure = ""
         """A sentence on angles that are not to be used, once the stream has ended; empty for good ones."""
 
     @property
-    def settings(self) -> Mapping[str, object]:
+    def deciding(self) -> Mapping[str, object]:
         """The problem, the calibrations, and all else that decides the digits."""
         of, settings = self._problem, self._settings
         return {
@@ -117,7 +115,6 @@ class Aoa:
             **self._sensors.settings,
             "attitude": repr((settings.attitude, settings.alarm)),
             "zero": repr(settings.zero),
-            "every": self._every,
             "band": repr((settings.band, settings.estimator.snap)),
         }
 
@@ -128,7 +125,7 @@ class Aoa:
         self._live = LimitedLive(self._problem, where=self._where)
         self._others = [LimitedLive(of, where=self._where) for of in self._leaning]
 
-    def initial(self) -> AoaState:
+    def begun(self) -> AoaState:
         """The state before the first row."""
         self._pose(self._settings)
         return AoaState(
@@ -138,20 +135,20 @@ class Aoa:
                 for each, of in zip(self._changes, self._others, strict=True)
             },
             t=-math.inf, begun=math.nan, temperature=math.nan, heard=math.nan, beyond=math.nan, watch=unwatched(),
-            unanswered=0, rows=0, head=np.empty((64, self._problem.count + BESIDE + 1)), seen=0, choice=np.empty(0),
-            zeroed=self._settings.zero is None, remarked=False, alarms=Alarms(), slots=Slots(),
+            unanswered=0, rows=0, head=Rows.of(self._problem.count + BESIDE + 1), choice=np.empty(0),
+            zeroed=self._settings.zero is None,
         )  # fmt: skip
 
-    def step(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[Output]]:
+    def stepped(self, state: AoaState, sample: Sample) -> tuple[AoaState, Sequence[StreamRow]]:
         """The state after a row, and the lines of this row and of those that were held until now."""
-        if state is not self._after:
+        if state is not self._last:
             self._go_on_from(state)
-        state = self._remarked(state)._replace(
-            temperature=self._sensors.temperature(sample, state.temperature)
-        )
+        for number, finding in enumerate(self._sensors.remarks):
+            self.say(finding, f"sensor {number}")
+        state = state._replace(temperature=self._sensors.temperature(sample, state.temperature))
         values, saturated = self._sensors.measured(sample, state.temperature)
         for k, text in saturated:
-            state = self._alarm(state, _SATURATED + k, "saturation", text, sample.t)
+            self.alarm("saturation", text, sample.t, f"saturation {k}")
         n = self._problem.count
         gyro, roll, yaw = values[n:].tolist()
         if sample.t > state.t:
@@ -160,7 +157,7 @@ class Aoa:
             state = state._replace(t=sample.t, begun=begun)
         readings = np.array([*values[:n], gyro, math.nan, math.nan, roll, yaw])
         if self._waits(state) or not state.zeroed:
-            state = kept(state, np.concatenate([[sample.t], readings]))
+            state = state._replace(head=state.head.after(np.array([sample.t, *readings])))
         if self._needs_rate and not state.choice.size:
             state, answers, turned = self._rated(state)
         else:
@@ -171,13 +168,13 @@ class Aoa:
         zero = None if state.zeroed else self._settings.zero
         if decides or (zero is not None and state.t > zero.end):
             state = self._again(state, decides)
-        self._after = state
+        self._last = state
         return state, outputs
 
-    def finish(self, state: AoaState) -> Sequence[Output]:
+    def ended(self, state: AoaState) -> Sequence[StreamRow]:
         """The lines of rows that were still held."""
         self._go_on_from(state)
-        outputs: list[Output] = []
+        outputs: list[StreamRow] = []
         if self._needs_rate and not state.choice.size:
             state, answers, turned = self._rated(state, last=True)
             state, outputs = self._lines(state, answers, self._others, turned)
@@ -215,7 +212,7 @@ class Aoa:
 
     def _rated(self, state: AoaState, last: bool = False) -> tuple[AoaState, Answers, list[Array]]:
         """The state once the rate of rows is known, for the study's band, and answers for the rows until then."""
-        head = state.head[: state.seen]
+        head = state.head.filled
         stamps = head[later_rows(head[:, 0]), 0]
         if len(stamps) >= LIMITS.rate_rows or last:
             settings = with_rate(self._settings, stamps)
@@ -229,7 +226,7 @@ class Aoa:
     def _again(self, state: AoaState, decides: bool) -> AoaState:
         """The state after the fusion has gone over all rows so far once more: with delay, band and snap where it
         ``decides`` on them, and with the zero where that is over."""
-        head, n = state.head[: state.seen].copy(), self._problem.count
+        head, n = state.head.filled.copy(), self._problem.count
         recording = Recording(
             head[:, 0], head[:, 1 : n + 1], head[:, n + 1], head[:, n + 4 :], head[:, n + 2 : n + 4]
         )
@@ -237,7 +234,7 @@ class Aoa:
         if decides:
             settings = decided(recording, self._settings)
             for finding in of_vibration(self._settings, settings):
-                self._say(finding)
+                self.tell(finding)
             state = state._replace(choice=choice_of(settings, final=True))
         if settings.zero is not None and state.t > settings.zero.end:
             head[:, n + 2 : n + 4] = self._zeroed(recording, settings)
@@ -252,7 +249,7 @@ class Aoa:
         state = state._replace(live=self._live.state, beside=beside)
         if self._waits(state) or not state.zeroed:
             return state
-        return state._replace(head=np.empty((64, head.shape[1])), seen=0)
+        return state._replace(head=Rows.of(head.shape[1]))
 
     def _zeroed(self, recording: Recording, settings: AoaSettings) -> Array:
         """Angles (k, 2) that the zero states for the rows of a recording, none where the model moves in its stretch;
@@ -260,10 +257,10 @@ class Aoa:
         try:
             zeroed = with_zero(recording, settings)
         except RecordError as error:
-            self._say(Finding("not_at_rest", f"the zero is left out: {error}", harm=EVERYTHING))
+            self.tell(Finding("not_at_rest", f"the zero is left out: {error}", harm=EVERYTHING))
             return recording.zero_angle
         for finding in zeroed.findings:
-            self._say(finding)
+            self.tell(finding)
         return zeroed.zero_angle
 
     def _go_on_from(self, state: AoaState) -> None:
@@ -273,21 +270,13 @@ class Aoa:
         changed = zip(self._leaning, state.beside.values(), strict=True)
         self._others = [LimitedLive(of, each.live, self._where) for of, each in changed]
 
-    def _remarked(self, state: AoaState) -> AoaState:
-        """The state once the findings on the sensors are given."""
-        if state.remarked:
-            return state
-        for finding in self._sensors.remarks:
-            self._say(finding)
-        return state._replace(remarked=True)
-
     def _heard(self, state: AoaState, t: float, gyro: float) -> AoaState:
         """The state with the last row of the gyro, or an alarm where it is silent."""
         if math.isfinite(gyro) or math.isnan(state.heard):
             return state._replace(heard=t)
         if self._sensors.has_gyro and t - state.heard > LIMITS.silent_time:
             text = f"gyro: no number for {LIMITS.silent_time:g} s; angles go on from accelerometers alone, less well"
-            return self._alarm(state, _SILENCE, "gyro_missing", text, t)
+            self.alarm("gyro_missing", text, t, "silence")
         return state
 
     def _judged(self, state: AoaState, answers: Answers) -> tuple[AoaState, Array]:
@@ -301,18 +290,14 @@ class Aoa:
                 f"NIS is {nis[k]:.3g} on average over {LIMITS.watched_time:g} s, expected 1 or less: the rows "
                 "contradict the model or the stated noise"
             )
-            state = self._alarm(state, _CONTRADICTION, "excess_scatter", text, float(answers.t[k]))
+            self.alarm("excess_scatter", text, float(answers.t[k]))
         return state, nis
-
-    def _alarm(self, state: AoaState, bit: int, code: str, text: str, t: float) -> AoaState:
-        """The state with an alarm given, once."""
-        return state._replace(alarms=state.alarms.give(bit, code, text, t, self._say))
 
     def _lines(
         self, state: AoaState, answers: Answers, others: Sequence[LimitedLive], turned: Sequence[Array]
-    ) -> tuple[AoaState, list[Output]]:
-        """The state with the slots of lines, and the lines that are due; ``turned`` is theta under changes."""
-        outputs: list[Output] = []
+    ) -> tuple[AoaState, list[StreamRow]]:
+        """The state, and the lines; ``turned`` is theta under changes."""
+        lines: list[StreamRow] = []
         rest, beside, changed = len(answers.t), {}, []
         for (name, before), live, theta in zip(state.beside.items(), others, turned, strict=True):
             theta = np.append(before.theta, theta)
@@ -326,14 +311,10 @@ class Aoa:
         for t, row in zip(answers.t.tolist(), values.tolist(), strict=True):
             if waits and row[_STATUS] == 0.0:
                 row[_STATUS] = SUSPECT
-            state = state._replace(beyond=watched_limits(self._settings, t, row, state.beyond, self._say))
-            if self._every > 0.0:
-                slots = state.slots.at(t, self._every) if math.isfinite(row[0]) else None
-                if slots is None:
-                    continue
-                state = state._replace(slots=slots)
-            outputs.append([t, *row])
+            state = state._replace(beyond=watched_limits(self._settings, t, row, state.beyond, self.tell))
+            # rows without an angle are of no interval
+            lines.append(
+                StreamRow(t if math.isfinite(row[0]) else math.nan, functools.partial(list, [t, *row]))
+            )
         without = int(np.isnan(answers.angles.theta).sum())
-        return state._replace(
-            unanswered=state.unanswered + without, rows=state.rows + len(answers.t)
-        ), outputs
+        return state._replace(unanswered=state.unanswered + without, rows=state.rows + len(answers.t)), lines

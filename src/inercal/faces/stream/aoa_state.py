@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.faces.stream.lines import Lines, Sample
-from inercal.faces.stream.run import Alarms, Slots
+from inercal.faces.stream.shell import Rows
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.column import Column
@@ -104,9 +104,8 @@ class AoaState(NamedTuple):
     latest stamp, ``begun`` [s] the first one (NaN before); ``temperature`` [degC] the last known one; ``heard`` [s] the
     last row with a number of the gyro, ``beyond`` [s] the last one with an angle beyond the limits (NaN before).
     ``watch`` is that of `inercal.systems.aoa.fusion.watch`; of all ``rows`` that were answered ``unanswered`` have no
-    angle. ``head`` (k, N + 6) are the first rows, time first, of which ``seen`` are filled, until all is decided and
-    the zero is over; ``choice`` is that (`choice_of`), empty before, ``zeroed``: the zero was put in. ``remarked``: the
-    findings on the sensors were given; ``slots`` that of the last line.
+    angle. ``head`` (N + 6 columns) are the first rows, time first, until all is decided and the zero is over;
+    ``choice`` is that (`choice_of`), empty before, ``zeroed``: the zero was put in.
     """
 
     live: LimitedState
@@ -119,22 +118,9 @@ class AoaState(NamedTuple):
     watch: Array
     unanswered: int
     rows: int
-    head: Array
-    seen: int
+    head: Rows
     choice: Array
     zeroed: bool
-    remarked: bool
-    alarms: Alarms
-    slots: Slots
-
-
-def kept(state: AoaState, row: Array) -> AoaState:
-    """The state with a row more in its head, whose array is used up."""
-    head, seen = state.head, state.seen
-    if seen == len(head):
-        head = np.vstack([head, np.empty_like(head)])
-    head[seen] = row
-    return state._replace(head=head, seen=seen + 1)
 
 
 def choice_of(settings: AoaSettings, final: bool) -> Array:

@@ -125,7 +125,7 @@ def _goals(settings: SelfcalSettings, names: Sequence[str]) -> Mapping[str, floa
     return settings.goal
 
 
-def strapdown(settings: StrapdownSettings, say: Say, say_finding: SayFinding) -> Make:
+def strapdown(settings: StrapdownSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
     """Prepare a calibration of a strapdown unit rest by rest."""
     from inercal.faces.stream.strapdown import Strapdown, load_kernels
 
@@ -133,7 +133,7 @@ def strapdown(settings: StrapdownSettings, say: Say, say_finding: SayFinding) ->
         load_kernels(settings)
 
     def estimator(lines: Lines) -> Strapdown:
-        made = Strapdown(lines, settings, say_finding)
+        made = Strapdown(lines, settings, interval, say_finding)
         if settings.noise.estimate:
             say(_WITHOUT_A_RECORDING)
         return made

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.faces.stream.lines import Lines, Sample
-from inercal.faces.stream.run import Output, Slots
+from inercal.faces.stream.run import Output
+from inercal.faces.stream.shell import StreamRow, SystemOnStream
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
 from inercal.foundation.noise.running import Octaves, Window, cascade, empty_octaves, empty_window, slide
@@ -35,8 +36,7 @@ class MonitorState(NamedTuple):
     (groups,) is the variance of the quiet start; before that is known (0), ``start`` (3, channels) holds its
     number of samples, means and sums of squared deviations, ``begun`` [s] its begin (NaN if it has not), and
     ``extremes`` (2, groups) the least and the largest variance of a window in it. ``still`` [s] is the begin
-    of the static interval, NaN where there is none; ``t`` [s] the last stamp; ``first`` [s] the first one,
-    from which the intervals of output are counted, and ``slot`` the number of the one of the last line.
+    of the static interval, NaN where there is none; ``t`` [s] the last stamp.
     """
 
     stamps: Array
@@ -50,11 +50,10 @@ class MonitorState(NamedTuple):
     extremes: Array
     still: float
     t: float
-    slots: Slots
 
 
-class Monitor:
-    """Tells rest from motion and measures the noise at rest (`inercal.faces.stream.run.Recursive`).
+class Monitor(SystemOnStream[MonitorState]):
+    """Tells rest from motion and measures the noise at rest.
 
     A line holds the time; whether the instrument is at rest (1 or 0), and for how long; the variance in the
     window over that of the quiet start, of the sensor where that is largest; the longest averaging time tau of
@@ -81,7 +80,8 @@ class Monitor:
     kind = "monitor"
 
     def __init__(self, lines: Lines, every: float = 0.0) -> None:
-        self._where, self._every = lines.where, every
+        super().__init__(every, lambda finding: None)
+        self._where = lines.where
         columns = list(lines.record.columns.values())
         self._places = [i for i, column in enumerate(columns) if _MEASURED.fullmatch(column.name)]
         watched = [columns[i] for i in self._places]
@@ -96,36 +96,26 @@ class Monitor:
         self.columns += [title for column in watched for title in _titles(column)]
 
     @property
-    def settings(self) -> Mapping[str, object]:
-        """The interval of the lines, and the limits."""
-        return {
-            "every": self._every,
-            "limits": np.array([LIMITS.moving_variance, LIMITS.initial_rest, _FIRST_STAMPS, _FEWEST]),
-        }
+    def deciding(self) -> Mapping[str, object]:
+        """The limits."""
+        limits = [LIMITS.moving_variance, LIMITS.initial_rest, _FIRST_STAMPS, _FEWEST]
+        return {"limits": np.array(limits)}
 
-    def initial(self) -> MonitorState:
+    def begun(self) -> MonitorState:
         """Nothing known."""
         channels, groups = len(self._places), len(self._groups)
         return MonitorState(
             stamps=np.empty(0), interval=0.0, window=empty_window(0, channels), octaves=empty_octaves(channels),
             started=False, quiet=np.zeros(groups), start=np.zeros((3, channels)), begun=math.nan,
-            extremes=_no_extremes(groups), still=math.nan, t=math.nan, slots=Slots(),
+            extremes=_no_extremes(groups), still=math.nan, t=math.nan,
         )  # fmt: skip
 
-    def step(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Sequence[Output]]:
-        """The state after a sample, and a line where one is due."""
-        if sample.wrong:
-            return state, ([self._line(state, math.nan)] if self._every == 0.0 else ())
-        timed = state.interval > 0.0
-        state = self._watched(state, sample) if timed else self._timed(state, sample.t)
-        slots = state.slots.at(sample.t, self._every)
-        if slots is None:
-            return state, ()
-        return state._replace(slots=slots), [self._line(state, sample.t)]
-
-    def finish(self, state: MonitorState) -> Sequence[Output]:
-        """Nothing."""
-        return ()
+    def stepped(self, state: MonitorState, sample: Sample) -> tuple[MonitorState, Sequence[StreamRow]]:
+        """The state after a sample, and its line."""
+        t = math.nan if sample.wrong else sample.t
+        if not sample.wrong:
+            state = self._watched(state, sample) if state.interval > 0.0 else self._timed(state, t)
+        return state, [StreamRow(t, lambda: self._line(state, t))]
 
     def _timed(self, state: MonitorState, t: float) -> MonitorState:
         """Find the sample interval from the first stamps; the window then has its length."""

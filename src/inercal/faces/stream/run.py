@@ -38,7 +38,6 @@ from inercal.faces.stream.checkpoint import alone, fingerprint, load, save
 from inercal.faces.stream.doubt import Doubt, HeldRows
 from inercal.faces.stream.lines import Lines, Sample, StreamLine
 from inercal.foundation.errors import RecordError
-from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.foundation.records.places import counted
 from inercal.foundation.records.write import number
 
@@ -49,40 +48,6 @@ Output = Sequence[float | str]
 """Values of an output line; NaN is written as nothing, texts as they are."""
 
 _HEAD = 64
-
-
-class Slots(NamedTuple):
-    """Intervals of which each has one output line: the time [s] from which they are counted, NaN before the first
-    line, and the number of that of the last line."""
-
-    first: float = math.nan
-    number: int = -1
-
-    def at(self, t: float, every: float) -> Slots | None:
-        """The slot of a line that is due at a stamp, None where none is; all are due with ``every`` [s] 0."""
-        if every == 0.0:
-            return self
-        first = t if math.isnan(self.first) else self.first
-        slots = (t - first) / every
-        if math.isnan(slots):
-            return None
-        # a stamp written in decimals may fall short of its slot by its rounding
-        number = math.floor(slots + 1e-12 * abs(slots) + 1e-9)
-        return None if number == self.number else Slots(first, number)
-
-
-class Alarms(NamedTuple):
-    """Findings that were given while a stream runs, each once: a bit each."""
-
-    given: int = 0
-
-    def give(self, bit: int, code: str, text: str, t: float, say: Callable[[Finding], None]) -> Alarms:
-        """The alarms with one given for the row at ``t`` [s], unless it was before."""
-        if self.given >> bit & 1:
-            return self
-        harm = () if CODES[code].harm is Harm.NEVER else EVERYTHING
-        say(Finding(code, text, f"t = {t:.10g} s", harm))
-        return Alarms(self.given | 1 << bit)
 
 
 class Recursive(Protocol[S]):

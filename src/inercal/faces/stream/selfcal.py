@@ -18,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.faces.stream.lines import Lines, Sample
-from inercal.faces.stream.run import Alarms, Output, Slots
+from inercal.faces.stream.shell import Channels, StreamRow, StreamState, SystemOnStream
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.consistency import RunningNis
 from inercal.systems.selfcal.filters.filter_result import (
     Estimates,
     FilterState,
@@ -40,13 +41,13 @@ from inercal.systems.selfcal.platform.recording import Steps
 from inercal.systems.selfcal.platform.states import KIND_OF, TEMPERATURE
 from inercal.systems.selfcal.result.columns import columns, rows
 
-_BAND = 5.0
-"""Standard deviations that the running mean of NIS may be above its expectation."""
-
 _SETTLED = 50
-"""Rows before which that is not judged."""
+"""Rows before which the mean NIS is not judged."""
 
 _SAID = 5
+"""Gaps that are said."""
+
+_ALARMS = ("excess_scatter", "filter_fails", "gimbal_lock")
 
 
 class SelfcalState(NamedTuple):
@@ -57,9 +58,8 @@ class SelfcalState(NamedTuple):
     before); ``rate`` (3,) [rad/s] the last one known whole and ``rated`` [s] the row that it stands in; ``read`` [s]
     the row of the last whole angles, which are in ``filter``. ``t`` [s] of the last row, ``steps`` (9,) [s] the last
     intervals (NaN before). ``doubt``: a rate was held and the encoders have not read since. ``angles`` (3,) [rad]
-    of the estimated attitude. ``nis`` and ``dims``: sums of the normalised innovations squared and of the scalars in
-    them, in ``rows`` rows. ``late`` rows in a row had no later time, ``gaps`` were seen, ``alarms`` are
-    those given; ``slots`` that of the last line; ``kept`` the rows for further passes.
+    of the estimated attitude; ``nis`` up to the row. ``late`` rows in a row had no later time; ``kept`` are the rows
+    for further passes.
     """
 
     begun: bool
@@ -72,18 +72,13 @@ class SelfcalState(NamedTuple):
     steps: Array
     doubt: bool
     angles: Array
-    nis: float
-    dims: int
-    rows: int
+    nis: RunningNis
     late: int
-    gaps: int
-    alarms: Alarms
-    slots: Slots
     kept: KeptRows
 
 
-class Selfcal:
-    """Calibrates a platform row by row (`inercal.faces.stream.run.Recursive`); columns as
+class Selfcal(SystemOnStream[SelfcalState]):
+    """Calibrates a platform row by row; columns as
     `inercal.systems.selfcal.result.columns` has them.
 
     Parameters
@@ -121,19 +116,15 @@ class Selfcal:
         fixed: Mapping[str, float] = MappingProxyType({}),
         goal: Mapping[str, float] = MappingProxyType({}),
     ) -> None:
-        self._module, self._problem, self._every, self._say = filter_of(problem), problem, every, say
-        self._where, record = lines.where, lines.record
-        sensor = "gyro" if "gyro_x" in record and "wc_x" not in record else "wc"
+        super().__init__(every, say)
+        self._module, self._problem, self._where = filter_of(problem), problem, lines.where
+        sensor = "gyro" if "gyro_x" in lines.record and "wc_x" not in lines.record else "wc"
         wanted = [f"{name}_{axis}" for name in (sensor, "th", "acc") for axis in "xyz"]
-        channels = [record[name] for name in wanted if name not in fixed]
-        for column in channels:
-            column.si()  # refuses counts
+        there = [name for name in wanted if name not in fixed]
+        self._channels, channels = Channels.of(lines, there), [lines.record[name] for name in there]
         rates = {column.name for column in channels[:3] if not column.increment}
         first = {column.name for column in channels if column.name not in rates and column.sensor != "th"}
         lines.leave_unsaid(first, rates)
-        names = list(record.columns)
-        self._places = [names.index(column.name) for column in channels]
-        self._factors = [column.unit.factor for column in channels]
         self._fixed = [(k, fixed[name]) for k, name in enumerate(wanted) if name in fixed]
         self._wanted = np.array([goal.get(name, math.inf) for name in problem.names])
         self._measured = sensor == "gyro"
@@ -141,34 +132,31 @@ class Selfcal:
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
 
     @property
-    def settings(self) -> Mapping[str, object]:
-        """The problem, the rate's columns, and the interval of the lines."""
+    def deciding(self) -> Mapping[str, object]:
+        """The problem, and the rate's columns."""
         problem = self._problem
         return {
             "world": problem.world,
             "noise": problem.noise,
             "prior": problem.prior,
             "filter": repr(problem.filter),
-            "rate": ", ".join(map(str, [*self._places, *self._gained.tolist()])),
-            "every": self._every,
+            "rate": ", ".join(map(str, [*self._channels.places.tolist(), *self._gained.tolist()])),
         } | ({"fixed": str(self._fixed)} if self._fixed else {})
 
-    def initial(self) -> SelfcalState:
+    def begun(self) -> SelfcalState:
         """Nothing known."""
         none = np.zeros(3)
         return SelfcalState(
             begun=False, filter=self._module.initial(self._problem, none), next=none.copy(), rate=none.copy(),
             rated=math.nan, read=math.nan, t=math.nan, steps=np.full(LIMITS.recent_intervals, np.nan), doubt=False,
-            angles=none.copy(), nis=0.0, dims=0, rows=0, late=0, gaps=0, alarms=Alarms(), slots=Slots(),
-            kept=KeptRows(),
+            angles=none.copy(), nis=RunningNis(), late=0, kept=KeptRows(),
         )  # fmt: skip
 
-    def step(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[Output]]:
+    def stepped(self, state: SelfcalState, sample: Sample) -> tuple[SelfcalState, Sequence[StreamRow]]:
         """The state after a row, and a line where one is due."""
         if math.isnan(sample.t):
             return state, ()
-        values = zip(self._places, self._factors, strict=True)
-        numbers = [sample.values[i] * factor for i, factor in values]
+        numbers = self._channels.si(sample).tolist()
         for k, angle in self._fixed:
             numbers.insert(k, angle)
         rate, th, acc = np.array(numbers).reshape(3, 3)
@@ -179,7 +167,7 @@ class Selfcal:
         dt = sample.t - state.t
         if dt <= 0.0:
             return self._late(state, sample.t), ()
-        state = self._after(state, sample.t, dt)
+        state = self._seen(state, sample.t, dt)
         state, over, walked = self._rate(state, sample.t, over)
         doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
         walk, later = dt if walked is None else walked, np.where(np.isfinite(following), following, over)
@@ -199,38 +187,36 @@ class Selfcal:
             estimate = estimate_of(filter_, self._problem)
         if trace.restarts:
             text = "the platform did not turn on as before: its attitude is taken anew from the encoders"
-            state = self._gap(state, sample.t, text)
+            self._gap(sample.t, text)
         nis, dims = float(trace.estimates.nis[0]), int(trace.estimates.dims[0])
         state = state._replace(
             filter=filter_, next=following, t=sample.t, late=0, doubt=doubt and not seen,
             read=sample.t if seen else state.read, kept=kept,
         )  # fmt: skip
         if math.isfinite(nis):
-            state = state._replace(nis=state.nis + nis, dims=state.dims + dims, rows=state.rows + 1)
-        return self._line(self._alarmed(state, trace), estimate, nis)
+            state = state._replace(nis=state.nis.after(nis, dims))
+        self._judge(state, trace)
+        return self._line(state, estimate, nis)
 
-    def enough(self, state: SelfcalState) -> str:
+    def enough(self, state: StreamState[SelfcalState]) -> str:
         """Words for a state in which all goals are met, and nothing contradicts the model; empty for others."""
-        if not state.begun or not np.isfinite(self._wanted).any():
+        of = self.within(state)
+        if not of.begun or not np.isfinite(self._wanted).any():
             return ""
-        estimate = estimate_of(state.filter, self._problem)
+        estimate = estimate_of(of.filter, self._problem)
         u = estimate.u[-1] / divisor(estimate.coefficients)[-1]
         count = int(np.isfinite(self._wanted).sum())
-        return f"all {count} goals are met at t = {state.t:.10g} s" if self._met(state, u) else ""
+        return f"all {count} goals are met at t = {of.t:.10g} s" if self._met(of, u) else ""
 
     def _met(self, state: SelfcalState, u: Array) -> bool:
         """True where standard uncertainties (p,) are within the goals, if there are any, no alarm was given, and the
         innovations have been judged."""
-        sound = state.rows >= _SETTLED and not state.alarms.given
+        sound = state.nis.rows >= _SETTLED and not self.has_said(*_ALARMS)
         return bool(sound and np.isfinite(self._wanted).any() and (u <= self._wanted).all())
-
-    def finish(self, state: SelfcalState) -> Sequence[Output]:
-        """Nothing."""
-        return ()
 
     def _begin(
         self, state: SelfcalState, t: float, rate: Array, th: Array
-    ) -> tuple[SelfcalState, Sequence[Output]]:
+    ) -> tuple[SelfcalState, Sequence[StreamRow]]:
         """The start, where all angles and the rate from here on are known; else it is waited for."""
         begun = bool(np.isfinite(th).all() and (np.isfinite(rate) | self._gained).all())
         if not begun:
@@ -252,19 +238,17 @@ class Selfcal:
             )
         return state._replace(late=state.late + 1)
 
-    def _after(self, state: SelfcalState, t: float, dt: float) -> SelfcalState:
+    def _seen(self, state: SelfcalState, t: float, dt: float) -> SelfcalState:
         """The state with an interval seen; a gap is said."""
         state = state._replace(steps=np.append(state.steps[1:], dt))
-        if dt <= LIMITS.gap_ratio * usual(state.steps):
-            return state
-        return self._gap(state, t, f"{dt:.4g} s without rows, the platform is taken to turn on as before")
+        if dt > LIMITS.gap_ratio * usual(state.steps):
+            self._gap(t, f"{dt:.4g} s without rows, the platform is taken to turn on as before")
+        return state
 
-    def _gap(self, state: SelfcalState, t: float, text: str) -> SelfcalState:
-        """The state with something said of a gap."""
-        if state.gaps < _SAID:
-            more = "; further gaps are not said" if state.gaps + 1 == _SAID else ""
-            self._say(Finding("gap", f"{text}{more}", f"t = {t:.10g} s"))
-        return state._replace(gaps=state.gaps + 1)
+    def _gap(self, t: float, text: str) -> None:
+        """Say something of a gap."""
+        more = "; further gaps are not said" if self.times_said("gap") + 1 == _SAID else ""
+        self.alarm("gap", f"{text}{more}", t, times=_SAID)
 
     def _rate(self, state: SelfcalState, t: float, rate: Array) -> tuple[SelfcalState, Array, float | None]:
         """The rate (3,) from the last row to ``t``, NaN where not recorded, without gaps; and where it is held, the
@@ -284,39 +268,31 @@ class Selfcal:
         walked = ((t - begun) ** 2 - (state.t - begun) ** 2) / step if self._measured else dt
         return state, np.where(long | ~np.isfinite(rate), held, rate), walked
 
-    def _alarmed(self, state: SelfcalState, trace: Trace) -> SelfcalState:
-        """The state with the alarms that were due now."""
-        above = state.nis - state.dims > _BAND * math.sqrt(2.0 * state.dims)
-        out = trace.estimates
+    def _judge(self, state: SelfcalState, trace: Trace) -> None:
+        """Give the alarms that are due now."""
+        nis, out = state.nis.nis, trace.estimates
+        if state.nis.rows >= _SETTLED and nis.mean > nis.limit(LIMITS.nis_sigmas):
+            text = (
+                f"NIS is {nis.mean:.4g} on average, expected {nis.expected:.4g}: the rows contradict the model or the "
+                "stated noise"
+            )
+            self.alarm("excess_scatter", text, state.t)
+        numbers = (out.coefficients, out.u, out.attitude_u)
         without_scale = bool((out.coefficients[:, KA1] == -1.0).any())
-        alarms = (
-            (
-                state.rows >= _SETTLED and above,
-                "excess_scatter",
-                f"NIS is {state.nis / max(state.rows, 1):.4g} on average, expected "
-                f"{state.dims / max(state.rows, 1):.4g}: the rows contradict the model or the stated noise",
-            ),
-            (
-                without_scale
-                or not all(np.isfinite(each).all() for each in (out.coefficients, out.u, out.attitude_u)),
-                "filter_fails",
-                "the filter diverged: its coefficients or their uncertainties are no numbers any more",
-            ),
-            (
-                self._problem.filter.kind == "gimbal-ukf" and trace.gimbal_cosine < LIMITS.singular_cosine,
-                "gimbal_lock",
-                "outer and platform axis coincide, where the gimbal-angle model does not hold: use a quaternion filter",
-            ),
-        )
-        for bit, (due, code, text) in enumerate(alarms):
-            if due:
-                state = state._replace(alarms=state.alarms.give(bit, code, text, state.t, self._say))
-        return state
+        if without_scale or not all(np.isfinite(values).all() for values in numbers):
+            text = "the filter diverged: its coefficients or their uncertainties are no numbers any more"
+            self.alarm("filter_fails", text, state.t)
+        if self._problem.filter.kind == "gimbal-ukf" and trace.gimbal_cosine < LIMITS.singular_cosine:
+            text = (
+                "outer and platform axis coincide, where the gimbal-angle model does not hold: use a quaternion "
+                "filter"
+            )
+            self.alarm("gimbal_lock", text, state.t)
 
     def _line(
         self, state: SelfcalState, estimate: RowHistory | Estimates, nis: float
-    ) -> tuple[SelfcalState, Sequence[Output]]:
-        """The state with its angles, and the line where one is due."""
+    ) -> tuple[SelfcalState, Sequence[StreamRow]]:
+        """The state with its angles, and its line, which is due where all goals are met."""
         (row,) = rows(
             estimate.attitude,
             estimate.attitude_u,
@@ -326,13 +302,10 @@ class Selfcal:
             self._problem.world,
         )
         state = state._replace(angles=row[:3].copy())
-        slots = state.slots.at(state.t, self._every) or (
-            state.slots if self._met(state, row[11::2]) else None
+        line = StreamRow(
+            state.t, lambda: [state.t, *row.tolist(), nis, state.nis.nis.mean], self._met(state, row[11::2])
         )
-        if slots is None:
-            return state, ()
-        mean = state.nis / state.rows if state.rows else math.nan
-        return state._replace(slots=slots), [[state.t, *row.tolist(), nis, mean]]
+        return state, [line]
 
 
 def filter_of(problem: FilterProblem) -> ModuleType:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from inercal.faces.stream.lines import Lines, Sample
-from inercal.faces.stream.run import Output
+from inercal.faces.stream.shell import Channels, Rows, StreamRow, SystemOnStream
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
@@ -30,30 +30,28 @@ _HEAD = 51
 """Rows that tell the interval of the samples, before anything is looked for."""
 
 _SAID = 5
+"""Stamps off the even steps that are said."""
 
 _CHECK = 1.0
 """Time [s] from one look for the end of a rest to the next."""
 
 
 class StrapdownState(NamedTuple):
-    """State after a row: ``rows`` (capacity, 7), of which ``filled`` are in use, with stamp, rate and force in SI;
-    first and last sample of the ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,)
-    after the last of them, NaN before; ``checked`` rows when rests were last looked for; ``failed`` was said; ``off``:
-    the last stamp was off the even steps, on which it was put; ``told`` such rows were said."""
+    """State after a row: the ``rows`` (7 columns) with stamp, rate and force in SI; first and last sample of the
+    ``rests`` (k, 2) so far, coefficients ``c`` (51,) and attitude at the start ``q`` (4,) after the last of them, NaN
+    before; ``checked`` rows when rests were last looked for; ``off``: the last stamp was off the even steps, on which
+    it was put."""
 
-    rows: Array
-    filled: int
+    rows: Rows
     rests: Array
     c: Array
     q: Array
     checked: int
-    failed: bool
     off: bool
-    told: int
 
 
-class Strapdown:
-    """Calibrates a strapdown unit rest by rest (`inercal.faces.stream.run.Recursive`); a line has the time of the end
+class Strapdown(SystemOnStream[StrapdownState]):
+    """Calibrates a strapdown unit rest by rest; a line has the time of the end
     of a rest, the number of rests, and each coefficient with its standard uncertainty.
 
     Raises `RecordError` for columns that are missing or not in physical units, and later for a gap.
@@ -62,15 +60,17 @@ class Strapdown:
     kind = "strapdown"
 
     def __init__(
-        self, lines: Lines, settings: StrapdownSettings, say: Callable[[Finding], None] = lambda _: None
+        self,
+        lines: Lines,
+        settings: StrapdownSettings,
+        every: float = 0.0,
+        say: Callable[[Finding], None] = lambda _: None,
     ) -> None:
-        self._settings, self._say, self._where, record = settings, say, lines.where, lines.record
-        channels = [record[f"{sensor}_{axis}"] for sensor in ("gyro", "acc") for axis in "xyz"]
-        for column in channels:
-            column.si()  # refuses counts
-        order = list(record.columns)
-        self._places = [order.index(column.name) for column in channels]
-        self._factors = np.array([column.unit.factor for column in channels])
+        super().__init__(every, say)
+        self._settings, self._where, record = settings, lines.where, lines.record
+        self._channels = Channels.of(
+            lines, [f"{sensor}_{axis}" for sensor in ("gyro", "acc") for axis in "xyz"]
+        )
         self._outputs = record["acc_x"].unit.factor, record["gyro_x"].unit.factor
         self._free = free_places(settings.terms, settings.gravity_u > 0.0, settings.site.latitude_u > 0.0)
         self._names = names(settings.terms, settings.frame)
@@ -80,44 +80,40 @@ class Strapdown:
             self.columns += [f"{name} [{unit}]", f"u_{name} [{unit}]"]
 
     @property
-    def settings(self) -> Mapping[str, object]:
+    def deciding(self) -> Mapping[str, object]:
         """The study, and where its columns are."""
-        return {"study": repr(self._settings), "columns": ", ".join(map(str, self._places))}
+        return {"study": repr(self._settings), "columns": ", ".join(map(str, self._channels.places.tolist()))}
 
-    def initial(self) -> StrapdownState:
+    def begun(self) -> StrapdownState:
         """No row seen."""
         c, q = np.full(SIZE, math.nan), np.full(4, math.nan)
-        return StrapdownState(np.empty((1024, 7)), 0, np.empty((0, 2)), c, q, 0, False, False, 0)
+        return StrapdownState(Rows.of(7, 1024), np.empty((0, 2)), c, q, 0, False)
 
-    def step(self, state: StrapdownState, sample: Sample) -> tuple[StrapdownState, Sequence[Output]]:
+    def stepped(self, state: StrapdownState, sample: Sample) -> tuple[StrapdownState, Sequence[StreamRow]]:
         """The state after a row, and a line where a rest has ended."""
-        values = np.array([sample.values[i] for i in self._places]) * self._factors
-        rows, count = state.rows, state.filled
+        values, count = self._channels.si(sample), state.rows.used
         if math.isnan(sample.t) and count < 2:
-            return state._replace(filled=0), ()  # nothing says when it was
+            return state._replace(rows=state.rows._replace(used=0)), ()  # nothing says when it was
         t, off = self._stamp(state, sample, values)
-        if off and not math.isnan(sample.t) and state.told < _SAID:
+        if off and not math.isnan(sample.t):
             text = f"t: {sample.t:.10g} s is off the even steps, on which {t:.10g} s is taken"
-            self._say(Finding("outlying_time", text, f"row {count + 1}"))
-            state = state._replace(told=state.told + 1)
-        if count == len(rows):
-            rows = np.concatenate([rows, np.empty_like(rows)])
-        rows[count, 0], rows[count, 1:] = t, values
-        state = state._replace(rows=rows, filled=count + 1, off=off)
-        if state.filled < _HEAD or (state.filled - state.checked) * self._ts(state) < _CHECK:
+            self.say(Finding("outlying_time", text, f"row {count + 1}"), times=_SAID)
+        state = state._replace(rows=state.rows.after(np.array([t, *values])), off=off)
+        count = state.rows.used
+        if count < _HEAD or (count - state.checked) * self._ts(state) < _CHECK:
             return state, ()
-        return self._looked(state._replace(checked=state.filled), ended=False)
+        return self._looked(state._replace(checked=count), ended=False)
 
-    def finish(self, state: StrapdownState) -> Sequence[Output]:
+    def ended(self, state: StrapdownState) -> Sequence[StreamRow]:
         """The line of the last rest."""
-        return self._looked(state, ended=True)[1] if state.filled >= _HEAD else ()
+        return self._looked(state, ended=True)[1] if state.rows.used >= _HEAD else ()
 
     def _stamp(self, state: StrapdownState, sample: Sample, values: Array) -> tuple[float, bool]:
         """The stamp [s] of a row, on the even steps where it has none or is alone off them; and whether it is off.
 
         Raises `RecordError` for a gap, and for what is no number: a solution is carried through every sample.
         """
-        rows, count, t = state.rows, state.filled, sample.t
+        rows, count, t = state.rows.filled, state.rows.used, sample.t
         if not np.isfinite(values).all():
             raise RecordError(self._where, f"row {count + 1} holds no number, expected one in every column")
         if count < _HEAD and not math.isnan(t):
@@ -137,11 +133,12 @@ class Strapdown:
 
     def _ts(self, state: StrapdownState) -> float:
         """Interval [s] of the samples."""
-        return float(state.rows[state.filled - 1, 0] - state.rows[0, 0]) / (state.filled - 1)
+        stamps = state.rows.filled[:, 0]
+        return float(stamps[-1] - stamps[0]) / (len(stamps) - 1)
 
-    def _looked(self, state: StrapdownState, ended: bool) -> tuple[StrapdownState, Sequence[Output]]:
+    def _looked(self, state: StrapdownState, ended: bool) -> tuple[StrapdownState, Sequence[StreamRow]]:
         """The state with rests that have ended since, and a line where there is one."""
-        ts, count, known = self._ts(state), state.filled, state.rests.astype(int)
+        ts, count, known = self._ts(state), state.rows.used, state.rests.astype(int)
         first, last = (0, 0) if not len(known) or self._settings.rests.list else known[-1].tolist()
         tail = _samples(state, first, count, ts)
         over = 0 if ended else round((self._settings.rests.margin + LIMITS.window) / ts)
@@ -163,10 +160,11 @@ class Strapdown:
         state = state._replace(rests=rests)
         return self._estimated(state, ts) if len(rests) > 1 else (state, ())
 
-    def _estimated(self, state: StrapdownState, ts: float) -> tuple[StrapdownState, Sequence[Output]]:
+    def _estimated(self, state: StrapdownState, ts: float) -> tuple[StrapdownState, Sequence[StreamRow]]:
         """The state with coefficients after the last rest, and their line."""
         settings, rests = self._settings, tuple(Dwell(*each) for each in state.rests.astype(int).tolist())
         end = rests[-1].stop
+        stamp = float(state.rows.filled[end - 1, 0])
         samples = _samples(state, 0, end, ts)
         none, before = np.empty(0), None
         if np.isfinite(state.c).all():
@@ -174,10 +172,8 @@ class Strapdown:
         nodes = nodes_of(samples, rests, settings.rests.node)
         found = filtered(samples, nodes, settings, before) or filtered(samples, nodes, settings)
         if found is None or not found.converged:
-            if not state.failed:
-                text = "the filter does not come to rest: take the batch on the whole recording"
-                self._say(Finding("filter_fails", text, f"t = {state.rows[end - 1, 0]:.10g} s"))
-            state = state._replace(failed=True)
+            text = "the filter does not come to rest: take the batch on the whole recording"
+            self.alarm("filter_fails", text, stamp)
         if found is None:
             return state, ()
 
@@ -187,18 +183,15 @@ class Strapdown:
             return stated(c, settings.terms, settings.frame, self._outputs)
 
         values, J = in_words(found.c[self._free]), slope(in_words, found.c[self._free])
-        u = np.sqrt(np.diag(J @ found.covariance @ J.T))
-        line = [
-            float(state.rows[end - 1, 0]),
-            float(len(rests)),
-            *np.stack([values, u], axis=1).ravel().tolist(),
-        ]
-        return state._replace(c=found.c, q=found.q_nb), [line]
+        with np.errstate(invalid="ignore"):  # of a recording that no solution fits: no number
+            u = np.sqrt(np.diag(J @ found.covariance @ J.T))
+        line = [stamp, float(len(rests)), *np.stack([values, u], axis=1).ravel().tolist()]
+        return state._replace(c=found.c, q=found.q_nb), [StreamRow(stamp, lambda: line)]
 
 
 def _samples(state: StrapdownState, first: int, end: int, ts: float) -> Samples:
     """Rows from the ``first`` to before the ``end`` as samples every ``ts`` [s]."""
-    rate, force = (np.ascontiguousarray(state.rows[first:end, k : k + 3]) for k in (1, 4))
+    rate, force = (np.ascontiguousarray(state.rows.filled[first:end, k : k + 3]) for k in (1, 4))
     return Samples(rate, force, ts)
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +48,26 @@ class Nis:
         if not math.isfinite(self.mean):
             return math.inf
         return (self.mean - self.expected) / self.standard_error
+
+
+class RunningNis(NamedTuple):
+    """NIS of the rows so far: its ``total``, the number of scalars, ``dims``, and of ``rows`` that have any."""
+
+    total: float = 0.0
+    dims: int = 0
+    rows: int = 0
+
+    def after(self, value: float, dims: int) -> RunningNis:
+        """The same with one row more."""
+        return RunningNis(self.total + value, self.dims + dims, self.rows + 1)
+
+    @property
+    def nis(self) -> Nis:
+        """The mean so far, NaN without rows."""
+        if not self.rows:
+            return Nis(math.nan, math.nan, math.nan, 0)
+        expected = self.dims / self.rows
+        return Nis(self.total / self.rows, expected, math.sqrt(2.0 * expected / self.rows), self.rows)
 
 
 def nis(values: ArrayLike, dims: ArrayLike) -> Nis:

@@ -13,7 +13,7 @@ from inercal.systems.aoa.diagnosis.choice import of_delay
 from inercal.systems.aoa.diagnosis.effect import of_flexure
 from inercal.systems.aoa.diagnosis.examination import diagnose
 from inercal.systems.aoa.diagnosis.spectrum import of_rectification
-from inercal.systems.aoa.diagnosis.unseen import unseen
+from inercal.systems.aoa.diagnosis.unmodelled import unmodelled
 from inercal.systems.aoa.estimators import EstimatorKind
 from inercal.systems.aoa.fusion import filter_result, live_band, smoother
 from inercal.systems.aoa.fusion.band import fused_case
@@ -84,7 +84,7 @@ def _fusion(case: PreparedRecording, progress: Progress) -> MeasuredAngles:
     findings = diagnose(*fused_case(zeroed, settings), case.findings, settings.band.every)
     said = (*case.findings, *findings)
     named = any(finding.harm and not finding.code.endswith("_scatter") for finding in said)
-    findings = [*findings, *of_delay(case.delay, of, filtered), *unseen(zeroed, of, settings, named)]
+    findings = [*findings, *of_delay(case.delay, of, filtered), *unmodelled(zeroed, of, settings, named)]
     findings += of_flexure(zeroed, of, filtered, settings)
     known_u = angles.u[np.isfinite(angles.u)]
     if len(known_u):

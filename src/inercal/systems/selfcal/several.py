@@ -44,8 +44,8 @@ from inercal.systems.selfcal.platform.coefficients import NAMES, product_slope, 
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.states import ALL, KIND_OF, UNIT_OF, WALK
 from inercal.systems.selfcal.result.budget import considered, systematic
-from inercal.systems.selfcal.result.not_fitted import Evidence, counted, evidence, of_all
 from inercal.systems.selfcal.result.outcome import COMMAND, MODEL, REFERENCES
+from inercal.systems.selfcal.result.unmodelled import Evidence, counted, evidence, of_all
 from inercal.systems.selfcal.settings import SelfcalSettings
 from inercal.systems.selfcal.still_joints import still_joints, told_apart
 from inercal.systems.selfcal.task import Calibration, based, calibrate

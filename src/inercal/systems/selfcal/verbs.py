@@ -103,7 +103,7 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 def prepare_design(study: Study) -> None:
     """Load, or compile, the kernels of `design`."""
     from inercal.systems.selfcal.before.bounds import bounds
-    from inercal.systems.selfcal.before.path_search import left_out, shifts
+    from inercal.systems.selfcal.before.path_search import shifts, unmodelled
     from inercal.systems.selfcal.filters.problem import problem
     from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, motion
 
@@ -111,7 +111,7 @@ def prepare_design(study: Study) -> None:
     with study.at_fault():
         resting, of = motion(PlatformPlan((Rest(0.2),)), settings.world), problem(settings)
         bounds(resting, of)
-        shifts(resting, of, left_out(settings))
+        shifts(resting, of, unmodelled(settings))
 
 
 def design(

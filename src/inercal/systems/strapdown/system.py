@@ -75,7 +75,7 @@ def _prepare_design(study: Study) -> None:
 def _stream(settings: StrapdownSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
     from inercal.faces.stream.estimators import strapdown
 
-    return strapdown(settings, say, say_finding)
+    return strapdown(settings, interval, say, say_finding)
 
 
 def _foresight(settings: StrapdownSettings) -> Foresight:

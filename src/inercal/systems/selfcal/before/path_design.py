@@ -16,7 +16,7 @@ from inercal.foundation.designs.search import Designed
 from inercal.foundation.findings import Finding
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, PathBounds, bounds
 from inercal.systems.selfcal.before.observability import Observability, observability
-from inercal.systems.selfcal.before.path_search import criterion, left_out, search, shifts
+from inercal.systems.selfcal.before.path_search import criterion, search, shifts, unmodelled
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import beyond
@@ -33,21 +33,21 @@ REFERENCES = (BAYESIAN_BOUNDS,)
 @dataclass(frozen=True, eq=False)
 class ComparedPath:
     """A plan judged by its bounds and its ``criterion``, what it takes ``beyond`` limits, and how far each error that
-    is ``left_out``, as large as stated or usual, shifts the coefficients (p,)."""
+    is ``unmodelled``, as large as stated or usual, shifts the coefficients (p,)."""
 
     name: str
     plan: PlatformPlan
     observability: Observability
     criterion: float
     beyond: tuple[str, ...]
-    left_out: Mapping[str, Array] = field(default_factory=dict)
+    unmodelled: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def shifted(self) -> Array:
         """(p,) shift of the coefficients by the errors left out, all together."""
         return np.sqrt(
             sum(
-                (np.square(each) for each in self.left_out.values()),
+                (np.square(each) for each in self.unmodelled.values()),
                 np.zeros(len(self.observability.bounds.u)),
             )
         )
@@ -57,7 +57,7 @@ class ComparedPath:
         bounds = self.observability.bounds
         ratio = self.shifted / bounds.u
         k = int(np.argmax(ratio))
-        by = max(self.left_out, key=lambda name: abs(float(self.left_out[name][k])))
+        by = max(self.unmodelled, key=lambda name: abs(float(self.unmodelled[name][k])))
         return f"{ratio[k]:.3g} u of {bounds.names[k]}, most by {by}"
 
 
@@ -93,7 +93,7 @@ class DesignedPath(Designed[ComparedPath]):
             worst = f"{100 * learned.ratio[k]:.3g} % {learned.names[k]}"
             remark = ", ".join(each.observability.at_prior) or "none"
             beyond = f"; beyond the limits of {', '.join(each.beyond)}" if each.beyond else ""
-            if each.left_out:
+            if each.unmodelled:
                 beyond += f"; errors left out: {each.worst_shift()}"
             figures = f"{each.plan.duration:8.6g}  {each.criterion:9.3g}  {worst:>23}"
             lines.append(f"{each.name:<{wide}}  {figures}  {remark}{beyond}")
@@ -188,7 +188,7 @@ def _compared(name: str, plan: PlatformPlan, settings: SelfcalSettings) -> Compa
     temperature = settings.simulated_temperature(len(commanded.t))
     warm = None if temperature is None else settings.warm(temperature)
     along = bounds(commanded, problem(settings), warm=warm)
-    of = left_out(settings)
+    of = unmodelled(settings)
     moved = shifts(commanded, problem(settings), of, warm)
     value = criterion(along, settings.goal, settings.search.criterion, np.square(moved).sum(axis=1))
     by_error = dict(zip(of.names, moved.T, strict=True))
@@ -230,6 +230,6 @@ def _entry(judged: ComparedPath, least: float) -> dict[str, Any]:
         "worst_combinations": judged.observability.worst(),
         "beyond": list(judged.beyond),
         "left_out": dict(zip(judged.observability.bounds.names, judged.shifted.tolist(), strict=True))
-        if judged.left_out
+        if judged.unmodelled
         else {},
     }

@@ -34,14 +34,14 @@ from inercal.systems.selfcal.platform.states import ALL, KIND_OF, WAVE
 from inercal.systems.selfcal.settings import Search, SelfcalSettings
 
 
-class LeftOut(NamedTuple):
+class UnmodelledErrors(NamedTuple):
     """Names (m,) of errors that are no states, and their standard deviations ``sizes`` (m,) [SI]."""
 
     names: tuple[str, ...]
     sizes: Array
 
 
-def left_out(settings: SelfcalSettings) -> LeftOut:
+def unmodelled(settings: SelfcalSettings) -> UnmodelledErrors:
     """The errors of ``design.robust``, as large as stated, else as usual; raises `StudyError` for one that is a
     state."""
     states, sizes = settings.states, settings.priors
@@ -52,10 +52,12 @@ def left_out(settings: SelfcalSettings) -> LeftOut:
     named = ALL[18 : WAVE + 2 * len(states.harmonics)]
     hidden = {*states.names, *settings.model.left_out}
     names = tuple(name for name in named if KIND_OF[name] in settings.search.robust and name not in hidden)
-    return LeftOut(names, np.array([sizes[ALL.index(name)] for name in names]))
+    return UnmodelledErrors(names, np.array([sizes[ALL.index(name)] for name in names]))
 
 
-def shifts(motion: CommandedMotion, problem: FilterProblem, of: LeftOut, warm: Array | None = None) -> Array:
+def shifts(
+    motion: CommandedMotion, problem: FilterProblem, of: UnmodelledErrors, warm: Array | None = None
+) -> Array:
     """Shifts (p, m) of the coefficients, product form, by one standard deviation of each error along a nominal path.
 
     ``warm`` (n,) [K] as of `inercal.systems.selfcal.before.bounds.bounds`.
@@ -114,7 +116,7 @@ def _from_start(ground: PathGround, rng: np.random.Generator) -> tuple[float, Se
 class PathGround:
     """The ground of a search: a plan without moves as ``model``; ``low`` and ``high`` (3,), limits of each joint in
     steps of the angle from the start; the ``number`` of steps that the time allows; the interval ``coarse`` [s] of its
-    rows, and the ``problem`` with the noise of rows so far apart; the errors ``left_out`` that count in u."""
+    rows, and the ``problem`` with the noise of rows so far apart; the errors ``unmodelled`` that count in u."""
 
     asked: Search
     model: PlatformPlan
@@ -125,7 +127,7 @@ class PathGround:
     coarse: float
     problem: FilterProblem
     goal: Mapping[str, float]
-    left_out: LeftOut
+    unmodelled: UnmodelledErrors
     joints: JointLimits
 
     def plan(self, turns: Sequence) -> PlatformPlan:
@@ -187,7 +189,7 @@ class PathGround:
     def value(self, turns: Sequence) -> float:
         """Criterion of a sequence at coarse steps."""
         path = motion(replace(self.plan(turns), step=self.coarse), self.problem.world)
-        shifted = np.square(shifts(path, self.problem, self.left_out)).sum(axis=1)
+        shifted = np.square(shifts(path, self.problem, self.unmodelled)).sum(axis=1)
         return criterion(bounds(path, self.problem), self.goal, self.asked.criterion, shifted)
 
     def first(self, rng: np.random.Generator) -> Sequence:
@@ -256,7 +258,7 @@ def _ground(settings: SelfcalSettings) -> PathGround:
         )
     low, high = _limits(settings, model)
     made = PathGround(
-        asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal, left_out(settings),
+        asked, model, low, high, time, number, *_coarse(settings, model, unit), settings.goal, unmodelled(settings),
         settings.joints,
     )  # fmt: skip
     if not made.clear(()):

@@ -55,7 +55,7 @@ class Explained(NamedTuple):
 
 
 @once
-def needed_states(case: Case) -> Explained | None:
+def unmodelled_states(case: Case) -> Explained | None:
     """The addition to the states that leaves innovations white, or most nearly so, if any does."""
     recording, problem = short(case)
     first = filtered((recording, problem))
@@ -169,7 +169,7 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
 def unsteady(case: Case, any_states: bool = True) -> Finding | None:
     """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
     other as possible too. States alone count with ``any_states`` only."""
-    noise, states = _restless_gyros(case), needed_states(case)
+    noise, states = _restless_gyros(case), unmodelled_states(case)
     found = [each for each in (noise, states if noise or any_states else None) if each]
     if not found:
         return None

@@ -31,8 +31,8 @@ from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
 from inercal.systems.selfcal.result.budget import considered, stated_errors, systematic, within
-from inercal.systems.selfcal.result.not_fitted import SOURCE as NOT_FITTED
-from inercal.systems.selfcal.result.not_fitted import not_fitted
+from inercal.systems.selfcal.result.unmodelled import SOURCE as UNMODELLED
+from inercal.systems.selfcal.result.unmodelled import unmodelled
 from inercal.systems.selfcal.settings import SelfcalSettings
 
 COMMAND = "selfcal"
@@ -112,7 +112,7 @@ def assemble(
     of_site, exact = systematic(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise.of_readings, max(dof, 1.0)), *of_site, *of_rig]
-    rest = not_fitted(recording, settings, filtered, combine(filtered.names, sources).u)
+    rest = unmodelled(recording, settings, filtered, combine(filtered.names, sources).u)
     if rest is not None:
         sources.append(rest.source)
         left_out = {kind: text for kind, text in left_out.items() if kind not in rest.counted}
@@ -264,7 +264,7 @@ def _hidden(
     for name, left in zip(judged.learned.names, ratio, strict=True):
         if left > HALF_SEEN and name not in judged.at_prior and KIND_OF[name] not in BIAS_WALK:
             source = max(budget, key=lambda each, name=name: each.share.get(name, 0.0)).source  # type: ignore[misc]
-            what = f"{source} leave" if source == NOT_FITTED else f"what is stated of {source} leaves"
+            what = f"{source} leave" if source == UNMODELLED else f"what is stated of {source} leaves"
             why = f"{what} {100.0 * left:.0f} % of its prior uncertain"
             hidden[name] = (float(left), why)
     return hidden

@@ -199,7 +199,7 @@ def turns(plan: PlatformPlan) -> Table:
 
 def paths(designed: DesignedPath) -> Table:
     """The path found beside others of the same time."""
-    rows, robust = [], any(each.left_out for each in designed.compare)
+    rows, robust = [], any(each.unmodelled for each in designed.compare)
     for each in designed.compare:
         learned = each.observability.learned
         worst = int(np.argmax(learned.ratio))

@@ -46,7 +46,7 @@ from inercal.systems.strapdown.fit.batch import (
 from inercal.systems.strapdown.fit.rests import Nodes
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.left_out import DRIFT, TestedEffect, drifts, posed, tests
+from inercal.systems.strapdown.noise.unmodelled import DRIFT, TestedEffect, drifts, posed, tests
 from inercal.systems.strapdown.settings import TURN_NOISE, WALKS, Noise, StrapdownSettings
 
 
@@ -237,7 +237,7 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
     """The noise that a recording shows, from a fit without.
 
     Walks are estimated where the study states none; what turns add, where they leave too much; unless an effect outside
-    the model that `left_out` finds, or a prior that cannot be, explains more of it.
+    the model that `unmodelled` finds, or a prior that cannot be, explains more of it.
     """
     asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
     turns = tuple(name for name in TURN_NOISE if name in asked and residuals(fitted)[1] > LIMITS.turn_excess)

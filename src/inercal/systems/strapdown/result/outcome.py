@@ -35,8 +35,8 @@ from inercal.systems.strapdown.model.coefficients import (
     stated,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.left_out import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.noise.restricted import residuals
+from inercal.systems.strapdown.noise.unmodelled import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.result.budget import sources
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings
 
@@ -110,7 +110,7 @@ def assemble(
     findings = [*record.findings, *at_prior_together(at_prior)]
     findings += exact_gravity(settings.site, "its relative error goes into all K1")
     findings += _too_quiet(fit)
-    findings += _left_out(tested, found, J, fitted_u)
+    findings += _unmodelled(tested, found, J, fitted_u)
     findings += [each for ramp in ramps if (each := _shown(ramp, found, J, fitted_u)).harm]
     findings += [drifts.finding] if drifts and drifts.finding else []
     findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
@@ -317,7 +317,7 @@ def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[
     return [Finding("turn_noise", text)]
 
 
-def _left_out(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
+def _unmodelled(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
     """The effect outside the model that explains most, where that is more than chance; else terms that usually are
     estimated and were left out, where they may shift a value by more than its u."""
     if not tested:

@@ -15,8 +15,7 @@ from inercal.faces.report.style import INK, plain_unit
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.places import counted
 from inercal.foundation.rigs.outputs import gravity_reference
-from inercal.systems.turntable.figures.rates import residuals_by_rate
-from inercal.systems.turntable.figures.steps import response_by_input
+from inercal.systems.turntable.figures.straight_line import residuals_by_rate, response_by_input
 from inercal.systems.turntable.figures.table import rig
 from inercal.systems.turntable.rate.calibration import RateCalibration
 from inercal.systems.turntable.regression import Regression

@@ -48,7 +48,7 @@ _WANDERS = {"gyro_walk": "kg0_T1", "accelerometer_walk": "ka0_T1"}
 """Kind of a walk -> that of which the columns, with a course of time in the place of temperature, are its own."""
 
 
-class NotFitted(NamedTuple):
+class Unmodelled(NamedTuple):
     """Kinds of errors that are not fitted but ``counted`` in u, as states and studies call them, what they add to the
     budget, and the finding that tells of them, None where that is little."""
 
@@ -81,9 +81,9 @@ class Evidence(NamedTuple):
     shift: Array
 
 
-def not_fitted(
+def unmodelled(
     recording: Recording, settings: SelfcalSettings, result: FilterResult, u: Array
-) -> NotFitted | None:
+) -> Unmodelled | None:
     """Errors that are not fitted by the ``result`` of a filter, whose coefficients have ``u`` (p,) without them; None
     where the states are not those of a rig, or where no error is left."""
     found = evidence(recording, settings, result)
@@ -93,7 +93,7 @@ def not_fitted(
 
 
 def evidence(recording: Recording, settings: SelfcalSettings, result: FilterResult) -> Evidence | None:
-    """Evidence that a recording has of errors which the ``result`` of a filter leaves out; None as in `not_fitted`."""
+    """Evidence that a recording has of errors which the ``result`` of a filter leaves out; None as in `unmodelled`."""
     if not {*RIG} <= {*settings.kinds}:
         return None
     case = averaged(recording, problem(settings), result)
@@ -141,7 +141,7 @@ def of_all(each: Sequence[Evidence]) -> Evidence:
     return Evidence(tuple(kinds), tuple(names), usual, score, information, shift)
 
 
-def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> NotFitted:
+def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> Unmodelled:
     """Uncertainty that the errors add to coefficients of these ``names`` (p,), with their ``slope`` (p, p) by the
     linear form and ``u`` (p,) without."""
     kinds = tuple(dict.fromkeys(found.kinds))
@@ -163,7 +163,7 @@ def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> No
             told.append(_item(kind, found, own, left))
     these = [name for name, by in zip(names, raised.tolist(), strict=True) if by]
     walks = ("bias_walk",) if {*BIAS_WALK} & {*kinds} else ()
-    return NotFitted((*kinds, *walks), source, _told(told, these) if these else None)
+    return Unmodelled((*kinds, *walks), source, _told(told, these) if these else None)
 
 
 def _constant(case: Case, now: FilterResult, settings: SelfcalSettings) -> _Effects:

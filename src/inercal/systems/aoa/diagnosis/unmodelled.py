@@ -26,7 +26,7 @@ from inercal.systems.aoa.reading.recording import Recording
 from inercal.systems.aoa.settings import AoaSettings
 
 
-def unseen(
+def unmodelled(
     recording: Recording, problem: FusionProblem, settings: AoaSettings, named: bool = False
 ) -> list[Finding]:
     """``prior_suspect`` where the gyro's scale contradicts its prior, or what explains that better, unless other errors

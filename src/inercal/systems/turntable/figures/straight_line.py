@@ -1,4 +1,4 @@
-"""The picture of a test by small steps: output over input, about the straight line."""
+"""Pictures of a rate test and of a test by small steps: what a straight line leaves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,35 @@ from inercal.faces.report.panels import draw
 from inercal.faces.report.style import COLOURS, INK
 from inercal.foundation.instruments.terms import shown_unit
 
-_MARKS = {"raised": ("^", "input was raised"), "lowered": ("v", "lowered"), "first": ("o", "first")}
+_BY_RATE = {"below": ("^", "approached from below"), "above": ("v", "from above"), "rest": ("o", "from rest")}
+_BY_STEP = {"raised": ("^", "input was raised"), "lowered": ("v", "lowered"), "first": ("o", "first")}
+_KEYS = ("rate_rad_s", "residual_ppm_of_full_scale", "u_ppm_of_full_scale")
+
+
+def residuals_by_rate(rows: Sequence[Mapping[str, Any]]) -> Picture:
+    """Residuals of the straight line over the rate, one panel for each gyro.
+
+    ``rows`` with ``channel``, ``rate_rad_s``, ``residual_ppm_of_full_scale``, ``u_ppm_of_full_scale`` and
+    ``reached_from``, in the order taken.
+    """
+    channels = list(dict.fromkeys(row["channel"] for row in rows))
+    panels = []
+    for channel in channels:
+        marks: list[Mark] = [Level(0.0, "", INK)]
+        for k, (way, (shape, label)) in enumerate(_BY_RATE.items()):
+            here = [row for row in rows if row["channel"] == channel and row["reached_from"] == way]
+            if here:
+                rate, residual, u = (np.array([row[key] for row in here]) for key in _KEYS)
+                marks.append(Dots(np.degrees(rate), residual, label, COLOURS[k], shape, up=u))
+        across = Axis("rate of the table [deg/s]" if channel == channels[-1] else "")
+        panels.append([Panel(marks, across, Axis(f"{channel}\nresidual [ppm of full scale]"), grid="y")])
+    return draw(
+        "Residual of each rate",
+        "Output minus the best straight line, over the scale factor and full scale, with its standard uncertainty. "
+        "A curve is non-linearity, a kink at zero asymmetry, a gap between the two ways hysteresis.",
+        panels,
+        0.6 + 1.9 * len(channels),
+    )
 
 
 def response_by_input(rows: Sequence[Mapping[str, Any]], scale: Mapping[str, float]) -> Picture:
@@ -31,7 +59,7 @@ def response_by_input(rows: Sequence[Mapping[str, Any]], scale: Mapping[str, flo
         zero = float(np.mean(fitted - line))
         order = np.argsort(x, kind="stable")
         marks: list[Mark] = [Level(0.0, "", INK)]
-        for k, (way, (shape, label)) in enumerate(_MARKS.items()):
+        for k, (way, (shape, label)) in enumerate(_BY_STEP.items()):
             here = np.array([row["input_was"] == way for row in own])
             if here.any():
                 off = (y - line - zero)[here] / scale[channel] / size
