@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -9,8 +10,18 @@ import pytest
 
 from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.foundation._toml import Strict, check
-from inercal.foundation.errors import StudyError
-from inercal.foundation.keys import REQUIRED, TIME, keys_of, option, quantities, quantity, within
+from inercal.foundation.errors import InputError, StudyError
+from inercal.foundation.keys import (
+    REQUIRED,
+    TIME,
+    Reading,
+    keys_of,
+    option,
+    quantities,
+    quantity,
+    table,
+    within,
+)
 from inercal.foundation.units import Quantity
 
 ACUTE = within(0.0, 0.5 * math.pi, "an angle from 0 to 90 deg")
@@ -35,6 +46,102 @@ class Search:
 
 class File(Strict):
     search: Stated[Search]
+
+
+@dataclasses.dataclass(frozen=True)
+class Wave:
+    """A wave."""
+
+    size: float = quantity("of it", "angle", REQUIRED, example="1 deg", uncertain=True, u="u")
+    u: float = 0.0
+    order: int = option("periods", 1, least=1)
+
+    def __post_init__(self):
+        """Refuse a wave that is none."""
+        if self.size == 0.0:
+            raise InputError("size", "found no size, expected one")
+
+
+@dataclasses.dataclass(frozen=True)
+class Course:
+    """A test of some kind."""
+
+    kind: Literal["sine", "file"] = option("how it moves", "sine")
+    mean: float | None = quantity(
+        "of a sine", "angle", "auto", example="1 deg", words={"auto": None}, kinds=("sine",)
+    )
+    path: str = option("of a file", "", kinds=("file",), needed=("file",))
+    start: tuple[float, float] = quantity(
+        "at the begin", "angle", (0.0, 0.0), example=["1 deg", "2 deg"], of="x, y", one=True, u="start_u"
+    )
+    start_u: tuple[float, float] = (0.0, 0.0)
+    spans: tuple[tuple[float, float], ...] = quantity(
+        "rests", "time", (), example=[["0 s", "1 s"]], of="a, b"
+    )
+    rates: Mapping[str, float] = quantity("by name", "frequency", {}, example={"gyro": "1 Hz"})
+    outputs: tuple[Literal["x", "y"], ...] = option("which", ("x",), least=1)
+    number: tuple[int, ...] = option("read", (), reads=Reading(lambda typed: 2 * typed, {"type": "integer"}))
+    usual: Wave = table("the usual wave", Wave(0.5, 0.1, 3))
+    waves: tuple[Wave, ...] = table("waves", ())
+    other: Wave | None = table("another", None)
+
+
+class CourseFile(Strict):
+    test: Stated[Course]
+
+
+def course(**keys):
+    return check(CourseFile, {"test": keys}, "s.toml", StudyError).test
+
+
+def test_tables_in_tables_are_settings_in_settings():
+    """Absent keys of a table are those of the field's default; lists and optional ones are read by the same fields."""
+    degree = math.radians(1.0)
+    found = course(usual={"order": 5}, waves=[{"size": "1(1) deg"}, {"size": "2(1) deg", "order": 2}])
+    assert found.usual == Wave(0.5, 0.1, 5)
+    assert [wave.order for wave in found.waves] == [1, 2]
+    assert (found.waves[1].size, found.waves[1].u) == pytest.approx((2.0 * degree, degree))
+    assert (course().usual, course().waves, course().other) == (Wave(0.5, 0.1, 3), (), None)
+
+
+def test_words_lists_of_so_many_names_and_readings():
+    found = course(
+        mean="auto", start="1.0(1) deg", spans=[["0 s", "2 s"]], rates={"gyro": "1 kHz"}, number=[2]
+    )
+    assert found.mean is None
+    assert found.start == pytest.approx((math.radians(1.0),) * 2)
+    assert found.start_u == pytest.approx((math.radians(0.1),) * 2)
+    assert (found.spans, found.rates, found.number) == (((0.0, 2.0),), {"gyro": 1000.0}, (4,))
+    assert course(outputs=["y", "x"]).outputs == ("y", "x")
+    assert course(mean="2 deg").mean == pytest.approx(math.radians(2.0))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"mean": "none"}, "test.mean: found 'none', expected .* such as \"1 deg\", or auto"),
+        (
+            {"kind": "file", "path": "a", "mean": "1 deg"},
+            "test.mean: found with kind = 'file', expected it with sine",
+        ),
+        ({"kind": "file"}, "test.path: missing, expected it with kind = 'file'"),
+        ({"start": ["1 deg"]}, "test.start: found .* expected a list of 2, for x, y, or one for all"),
+        ({"spans": [["1 s"]]}, "test.spans.0: found .* expected a list of 2, for a, b"),
+        ({"outputs": []}, "test.outputs: found \\[\\], expected 1 or more in it"),
+        ({"outputs": ["z"]}, "test.outputs.0: found 'z', expected 'x' or 'y'"),
+        (
+            {"waves": [{"size": "1 deg"}]},
+            "test.waves.0.size: found '1 deg', expected it with its standard unc",
+        ),
+        ({"waves": [{"size": "0(1) deg"}]}, "test.waves.0.size: found no size, expected one"),
+        ({"waves": [{"sice": "1(1) deg"}]}, "test.waves.0.sice: unknown key, did you mean size"),
+        ({"usual": {"order": 0}}, "test.usual.order: found 0, .* greater than or equal to 1"),
+        ({"rates": {"gyro": "1 s"}}, "test.rates.gyro: found '1 s'"),
+    ],
+)
+def test_what_is_wrong_in_a_nested_table_is_named_by_its_key(keys, words):
+    with pytest.raises(StudyError, match=words):
+        course(**keys)
 
 
 def read(**keys):
@@ -81,13 +188,13 @@ def test_one_sentence_for_what_is_wrong(keys, words):
 
 def test_the_schema_has_what_the_field_says():
     """Unit and default as people write them, not in SI."""
-    table = table_of(Search).model_json_schema()
-    assert table["description"] == "A search."
-    angle = table["properties"]["angle"]
+    schema = table_of(Search).model_json_schema()
+    assert schema["description"] == "A search."
+    angle = schema["properties"]["angle"]
     assert (angle["default"], angle["description"]) == ("30 deg", "of a step")
-    assert table["required"] == ["time"]
-    assert "angle_u" not in table["properties"]
-    assert [key.name or field.name for field, key in keys_of(Search)] == list(table["properties"])
+    assert schema["required"] == ["time"]
+    assert "angle_u" not in schema["properties"]
+    assert [key.name or field.name for field, key in keys_of(Search)] == list(schema["properties"])
 
 
 def test_a_table_with_more_keys_fills_fields_of_its_own():

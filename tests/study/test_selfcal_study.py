@@ -332,11 +332,11 @@ def test_one_sentence_for_what_is_wrong(write, override, words):
             {"model": {"states": "rig"}, "filter": {"kind": "svd-qukf"}},
             "model.states: found gamma, .* for svd-qukf, which has none",
         ),
-        ({"filter": {"kind": "mukf"}}, "filter.kind: found 'mukf', .* expected 'error-state' in its place"),
-        ({"filter": {"kind": "lm"}}, "filter.kind: found 'lm', .* expected 'map' in its place"),
+        ({"filter": {"kind": "mukf"}}, "filter.kind: found 'mukf', .* expected in its place error-state"),
+        ({"filter": {"kind": "lm"}}, "filter.kind: found 'lm', .* expected in its place map"),
         (
             {"filter": {"kind": "linear"}},
-            "filter.kind: found 'linear', .* expected 'error-state' in its place",
+            "filter.kind: found 'linear', .* expected in its place error-state",
         ),
         (
             {"model": {"states": "rig"}, "filter": {"extended": True}},

@@ -207,11 +207,15 @@ def unheeded(settings: type, kind: str) -> dict[str, tuple[str, ...]]:
 GONE: Mapping[tuple[str, str], str] = {
     ("static", "difference"): "complementary, the same angle once the dual accelerometer has made both axes equal",
     ("static", "gls"): "the fusion, which weighs all axes by their errors",
+    **dict.fromkeys([("filter.kind", "mukf"), ("filter", "mukf")], "error-state"),
+    **dict.fromkeys([("filter.kind", "linear"), ("filter", "linear")], "error-state"),
+    **dict.fromkeys([("filter.kind", "lm"), ("filter", "lm")], "map"),
 }  # fmt: skip
-"""Choices that versions up to 0.2.0 had, by key or option and choice: what to use in their place."""
+"""Choices that versions up to 0.2.0 had, by key, its last word or option, and choice: what to use in their place."""
 
 
 def in_place_of(key: str, choice: str) -> str | None:
     """The end of a sentence on a ``choice`` of a key or option that is gone; None for one that never was."""
-    instead = GONE.get((key.rpartition(".")[2].removeprefix("--"), choice))
+    names = (key, key.rpartition(".")[2].removeprefix("--"))
+    instead = next((GONE[name, choice] for name in names if (name, choice) in GONE), None)
     return None if instead is None else f"which is gone since 0.3.0, expected in its place {instead}"

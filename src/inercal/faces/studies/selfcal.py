@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, create_model, field_validator
+from pydantic import Field, create_model
 
 from inercal.faces.studies.common import SiteTable, StudyFile, site_on_earth
-from inercal.faces.studies.fields import QuantityText, Several, SeveralTexts, Word, positive, refusal
+from inercal.faces.studies.fields import QuantityText, Several, SeveralTexts, Word, positive
 from inercal.faces.studies.platform import CommandTable, GimbalsTable, PlacedRecordTable, plan_of
 from inercal.faces.studies.platform_model import ModelTable, model_of, on_rig, true_errors
 from inercal.faces.studies.tables import replaced, settings_of, table_of
@@ -22,7 +22,6 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.units import parse_quantity
 from inercal.systems.selfcal.disturbances import Disturbances
-from inercal.systems.selfcal.estimators import GONE
 from inercal.systems.selfcal.platform.coefficients import BETA, EXTENDED, GROUPS
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
 from inercal.systems.selfcal.platform.rig import Base, Gimbals
@@ -89,16 +88,6 @@ class GoalTable(_WANTED):  # type: ignore[misc]
 
 class FilterTable(table_of(Filter)):  # type: ignore[misc]
     """Choice and settings of the estimator."""
-
-    @field_validator("kind", mode="before")
-    @classmethod
-    def _still_there(cls, kind: object) -> object:
-        """Refuse an estimator of earlier versions, and say what serves instead."""
-        if isinstance(kind, str) and kind in GONE:
-            raise refusal(
-                f"found {kind!r}, which inercal no longer has, expected {GONE[kind]!r} in its place"
-            )
-        return kind
 
     gating: Literal["off", "any", "two", "channel"] = Field(
         default="off",

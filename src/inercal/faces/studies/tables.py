@@ -23,17 +23,17 @@ T = TypeVar("T")
 
 
 @functools.cache
-def table_of(settings: type, tables: bool | None = None) -> Any:
+def table_of(settings: type, tables: bool | None = None, needed: bool = True) -> Any:
     """The pydantic model of a table whose keys are those of ``settings``; a base class for tables with more keys.
 
-    ``tables``: of those keys the tables, or all but the tables.
+    ``tables``: of those keys the tables, or all but the tables; ``needed``: keys without a default must be there.
     """
     hints = get_type_hints(settings)
     system = settings.__module__.split(".")[:3][-1].capitalize()
     fields: dict[str, Any] = {
         key.name or field.name: (
             _type(key, hints[field.name], field.default),
-            _described(key, field, hints[field.name]),
+            _described(key, field, hints[field.name], needed),
         )
         for field, key in keys_of(settings)
         if tables in (None, key.table)
@@ -102,7 +102,7 @@ class _Reader:
             except InputError as error:
                 raise refusal(error.message, error.where) from error
 
-        table = handler.generate_schema(table_of(source))
+        table = handler.generate_schema(table_of(source, needed=self.usual is None))
         return core_schema.no_info_after_validator_function(built, table)
 
 
@@ -201,12 +201,22 @@ def _plain(hint: Any) -> Any:
     return hint
 
 
-def _described(key: Key, field: dataclasses.Field[Any], hint: Any) -> Any:
+def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool) -> Any:
     """Meaning, default and bounds of a field; an absent quantity is None, the settings know what it stands for."""
-    default = field.default if field.default_factory is MISSING else {}
+    default: Any = field.default if field.default_factory is MISSING else {}
+    if default is MISSING and not needed:
+        default = None
     plain = not (key.dimension or key.table)
     listed = get_origin(hint) is tuple
-    absent = ... if default is MISSING else None if key.dimension else list(default) if listed else default
+    absent = (
+        ...
+        if default is MISSING
+        else None
+        if key.dimension
+        else list(default)
+        if default and listed
+        else default
+    )
     quantity = key.dimension not in ("", OUTPUT) and not (
         listed or key.words or key.of or isinstance(default, dict)
     )

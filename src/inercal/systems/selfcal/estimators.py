@@ -17,9 +17,6 @@ FACTOR_OF: Final[Mapping[FilterKind, FactorKind]] = {
 }
 """Factor of the covariance that each sigma-point filter takes where the study names none."""
 
-GONE: Final[Mapping[str, FilterKind]] = {"mukf": "error-state", "lm": "map", "linear": "error-state"}
-"""Estimators of version 0.2.0 that are no more, and what serves instead of each."""
-
 
 class EstimatorWords(NamedTuple):
     """An estimator in ``words``, and the ``publications`` behind it beside those of self-calibration; ``rig``: it can
