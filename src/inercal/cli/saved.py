@@ -117,7 +117,7 @@ def compare(
 
 
 Tool = Literal["imu_tk", "imucal", "kalibr", "psins"]
-FilterTool = Literal["openvins", "vins"]
+Target = Literal["imu_tk", "imucal", "kalibr", "openvins", "psins", "vins"]
 
 
 def convert(
@@ -127,7 +127,7 @@ def convert(
     ],
     /,
     *,
-    to: Annotated[Tool | FilterTool | None, Parameter(help="The tool to write for.")] = None,
+    to: Annotated[Target | None, Parameter(help="The tool to write for.")] = None,
     source: Annotated[Tool | None, Parameter(name="--from", help="The tool that wrote the file.")] = None,
     acc_unit: Annotated[
         str | None,
