@@ -195,7 +195,7 @@ def test_no_circles():
 WITHIN = {
     "imu": (
         "limits identified recording rows turns settings second_order simulate multiposition means known_rates "
-        "known_turns ferraris aided temperature task figures verbs system"
+        "known_turns ferraris sections aided temperature task figures verbs system"
     ),
     "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
     "turntable": (

@@ -31,25 +31,25 @@ class Section:
     acc: Array | None = None
     """Mean outputs (3,) of the accelerometers, NaN for a channel that is not there; of a turn those before it."""
     acc_var: Array | None = None
-    """Variances (3,) of ``acc`` by noise; None: not known."""
+    """Variances (3,) of ``acc`` by noise; None: not priors."""
     acc_after: Array | None = None
     """Mean outputs (3,) after a turn."""
     gyro: Array | None = None
     """Mean outputs (3,) of the gyros, of a turn over the motion alone."""
     gyro_var: Array | None = None
-    """Variances (3,) of ``gyro`` by noise; None: not known."""
+    """Variances (3,) of ``gyro`` by noise; None: not priors."""
     up: Array | None = None
-    """Direction (3,) of specific force (up at rest); None: not known."""
+    """Direction (3,) of specific force (up at rest); None: not priors."""
     up_u: float | None = None
     """Standard uncertainty of ``up`` in either direction across [rad]; None: not stated."""
     force: Array | None = None
     """Specific force (3,) itself, where another instrument measured it [m/s^2]; ``up`` is then not used."""
     axis: Array | None = None
-    """Axis (3,) of the rotation, by the right-hand rule; None: not known."""
+    """Axis (3,) of the rotation, by the right-hand rule; None: not priors."""
     axis_u: float | None = None
     """Standard uncertainty of ``axis`` in either direction across [rad]; None: not stated."""
     level_u: float | None = None
-    """The axis is vertical within so much [rad]; ``up`` then only tells which end is up. None: not known."""
+    """The axis is vertical within so much [rad]; ``up`` then only tells which end is up. None: not priors."""
     rate: float = 0.0
     """Rate of a ``rate`` section about ``axis`` [rad/s]."""
     rate_u: float = 0.0
@@ -66,9 +66,13 @@ class Section:
     """Mean cosine and sine of the angle over a turn; None: those of a steady turn."""
     setup: str = ""
     """Sections of one setup share one placing: not touched between them."""
+    north: Array | None = None
+    """Direction (3,) of north on the axes of the case at the beginning; None: the heading is not priors."""
+    north_u: float = 0.0
+    """Standard uncertainty of the heading [rad]."""
     session: str = ""
     """Sections of one session share the biases of one turn-on."""
     scatter: str = ""
     """Sections of one group share one variance of means that nobody states."""
     temperature: float | None = None
-    """Temperature [K], where it is known."""
+    """Temperature [K], where it is priors."""
