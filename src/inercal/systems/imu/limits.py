@@ -126,6 +126,12 @@ class Limits:
 
     # sections
 
+    contradiction: float = 1e-3
+    """Probability of the residuals below which sections contradict what is said of them."""
+
+    beyond_scatter: float = 3.0
+    """Logarithm of a scatter over its median beforehand, in standard deviations, beyond which no instrument has it."""
+
     led_tilt: float = 0.02
     """Standard deviation [rad] of a vertical by the accelerometers of a unit that turns slowly."""
 

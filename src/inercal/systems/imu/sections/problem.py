@@ -68,7 +68,7 @@ class RowBlock:
     ``residual`` (c, k); ``shared`` (c, k, s) the derivatives by all shared unknowns; ``local`` (c, k, q) those by the
     unknowns of sections whose places in x are ``at`` (c, q), the same place at most once in a cell. Errors have the
     variance ``variance`` + sum of exp(2 z) ``scatter`` (c, k), by the name of each component. Rows not ``seen`` (c, k)
-    do not count.
+    do not count. ``sources`` (k,) are names in budgets of the errors of the rows of a cell.
     """
 
     residual: Array
@@ -78,6 +78,7 @@ class RowBlock:
     variance: Array
     scatter: dict[str, Array]
     seen: Flags
+    sources: tuple[str, ...]
 
 
 class Extra(Protocol):
