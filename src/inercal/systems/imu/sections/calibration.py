@@ -10,10 +10,10 @@ from scipy.linalg import LinAlgError
 from scipy.special import chdtrc, stdtrit
 
 from inercal.foundation.arrays import Array, short_repr
-from inercal.foundation.inference.variances import second_moment, weighed
-from inercal.systems.imu.limits import LIMITS
+from inercal.foundation.inference.variances import degrees, second_moment, weighed
 from inercal.systems.imu.sections.agreement import of_placing, of_sections, of_sensors
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
+from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
@@ -157,7 +157,9 @@ def _fit(problem: Problem) -> _Fit:
     for _ in range(3):
         point, linear, converged = solved(problem, point, z)
         z, spread = mode(linear, z)
-        least_known = z + 2.0 * np.linalg.norm(spread, axis=1)  # a scatter that may be small makes no fine instrument
+        least_known = z + 2.0 * np.linalg.norm(
+            spread, axis=1
+        )  # a scatter that may be small makes no fine instrument
         problem = with_classes(problem, _noise(problem, point, least_known))
         point = _shortened(problem, point, linear, linear.at(z), z)
     point, linear, converged = solved(problem, point, z)
@@ -210,10 +212,9 @@ def _result(fit: _Fit) -> SectionCalibration:
     variances = np.einsum("ij,gjk,ik->gi", J, covariances, J)
     covariance = J @ covariance @ J.T
     U = half_widths(weights, (shifts - mean) @ J.T, np.sqrt(variances))
-    average = weights @ variances
-    dof = np.maximum(
-        2.0 * average**2 / np.maximum(weights @ (variances - average) ** 2, 1e-12 * average**2), 1.0
-    )
+    logs_of = np.log(variances)
+    dof = degrees(np.maximum(weights @ (logs_of - weights @ logs_of) ** 2, 1e-12))
+    dof = np.maximum(dof, LIMITS.fewest_dof)  # u would no longer be like the standard deviation with fewer
     u = U / stdtrit(dof, 0.975)
     scale = u / np.sqrt(np.diag(covariance))
 
@@ -245,7 +246,10 @@ def _result(fit: _Fit) -> SectionCalibration:
         by_prior=tuple(np.array(names)[ruled].tolist()),
         leaning=tuple(np.array(names)[leaning].tolist()),
         scatter={name: float(np.exp(weights @ logs[:, k])) for k, name in enumerate(problem.sizes)},
-        scatter_dof={name: _dof(weights, np.exp(2.0 * logs[:, k])) for k, name in enumerate(problem.sizes)},
+        scatter_dof={
+            name: float(degrees(4.0 * weights @ (logs[:, k] - weights @ logs[:, k]) ** 2))
+            for k, name in enumerate(problem.sizes)
+        },
         beyond={
             name: float((z[k] - np.log(s.median)) / s.spread)
             for k, (name, s) in enumerate(problem.sizes.items())
@@ -295,9 +299,3 @@ def _budget(problem: Problem, linear: Linear, best: ArrowSolution, z: Array, J: 
             out[source] = out.get(source, 0.0) + share
     whole = np.sum(list(out.values()), axis=0)
     return {source: share / whole for source, share in out.items() if np.any(share > 0.0)}
-
-
-def _dof(weights: Array, variances: Array) -> float:
-    """Degrees of freedom of a variance that is spread over (g,) values."""
-    average = float(weights @ variances)
-    return float(2.0 * average**2 / max(float(weights @ (variances - average) ** 2), 1e-12 * average**2))
