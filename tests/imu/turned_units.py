@@ -140,8 +140,8 @@ class Bench:
             said["level_u"] = level
         before, after = (self.noisy(self.unit.accelerometers(f[k]), "acc") for k in (0, -1))
         return Section(
-            "turn", acc=before, acc_after=after, gyro=self.noisy(mean, "gyro"), angle=angle, angle_u=angle_u, duration=duration,
-            **said, **self.variances(), **more,
+            "turn", acc=before, acc_after=after, gyro=self.noisy(mean, "gyro"),
+            angle=angle, angle_u=angle_u, duration=duration, **said, **self.variances(), **more,
         )  # fmt: skip
 
     def spin(

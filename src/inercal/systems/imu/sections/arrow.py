@@ -8,7 +8,8 @@ left is a small problem of the shared unknowns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -90,6 +91,15 @@ class Linear:
         self.sizes = np.array(
             [[np.log(size.median), size.spread] for size in problem.sizes.values()]
         ).reshape(-1, 2)
+
+    def without(self, section: int) -> Linear:
+        """The problem without the means of a section."""
+        first, *others = self._blocks
+        used = first.used.copy()
+        used[section] = 0.0
+        out = copy(self)
+        out._blocks = [replace(first, used=used), *others]
+        return out
 
     def _gathered(self, block: RowBlock, place: Places) -> _Gathered:
         """A block by the free unknowns."""

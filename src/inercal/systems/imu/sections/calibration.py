@@ -11,7 +11,7 @@ from scipy.special import chdtrc, stdtrit
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.inference.variances import degrees, second_moment, weighed
-from inercal.systems.imu.sections.agreement import of_placing, of_sections, of_sensors
+from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
@@ -262,7 +262,7 @@ def _result(fit: _Fit) -> SectionCalibration:
         excess=problem.priors.excess,
         freed=False,
         residuals=misfit(problem, fit.point),
-        outlying=of_sections(*means, best.chi2, freedom, not problem.sizes),
+        outlying=outlying(linear, z, best),
         placed=placed,
         placed_sigmas=sigmas,
         converged=fit.converged,

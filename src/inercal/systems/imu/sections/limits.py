@@ -91,6 +91,9 @@ class Limits:
     fewest_dof: float = 4.0
     """Degrees of freedom by which u is told from U at least: of four U is 1.96 times the standard deviation."""
 
+    suspect_section: float = 0.05
+    """Probability of a section's distance from all others below which scatter is found without it."""
+
     misplaced: float = math.radians(45.0)
     """Angle [rad] from its name beyond which a section is not what its name says."""
 
