@@ -6,18 +6,21 @@ from typing import Final
 
 import numpy as np
 from scipy.linalg import LinAlgError
-from scipy.special import chdtrc, fdtrc
+from scipy.special import chdtrc
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.variances import degrees
+from inercal.foundation.inference.variances import weighed
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.problem import Iterate, Problem
-from inercal.systems.imu.sections.scatters import mode
+from inercal.systems.imu.sections.scatters import mode, nodes
 from inercal.systems.imu.sections.unknowns import SWIVEL, TILT
 
 _TOLD: Final = 1e-6
 """Share of the variance of a residual below which the section itself settles it."""
+
+_LEAST_WEIGHT: Final = 1e-3
+"""Weight of a node below which it is left out of such a probability."""
 
 
 def of_sensors(problem: Problem, rest: Array, covariance: Array) -> dict[str, float]:
@@ -69,12 +72,13 @@ def outlying(linear: Linear, z: Array, solution: ArrowSolution) -> Array:
     if p[worst] < LIMITS.suspect_section:
         without = linear.without(worst)
         try:
-            there, spread = mode(without, z)
-            off, told = of_sections(*linear.left(there, linear.at(there))[0])
+            logs, volume = nodes(*mode(without, z))
+            weights = weighed(np.array([without.likelihood(there) for there in logs]) + volume)
+            heavy = weights > _LEAST_WEIGHT
+            found = [of_sections(*linear.left(there, linear.at(there))[0])[0][worst] for there in logs[heavy]]
         except LinAlgError:
             return out
-        dof = float(degrees(4.0 * np.max(np.sum(spread**2, axis=1))))
-        out[worst] = fdtrc(told[worst], dof, off[worst] / told[worst])
+        out[worst] = weights[heavy] @ chdtrc(told[worst], np.array(found))
     return out
 
 

@@ -166,6 +166,9 @@ def _means(problem: Problem, point: Iterate) -> RowBlock:
     variance = r.variance.copy()
     g = problem.priors.site.gravity
     variance[:, :2] += (point.loss[:, :1] * (g * point.up * x[K1]) ** 2)[:, None]
+    # what g-sensitivity adds where specific force is not known at all, but known elsewhere
+    unfelt = (problem.sd[G].reshape(3, 3).max(axis=1) * g * x[S]) ** 2
+    variance[:, 2] += np.where(r.has_force[:, None], 0.0, unfelt)
     variance[:, 2] += point.loss[:, 1:] * (r.rate[:, None] * point.axis * x[S]) ** 2
     return RowBlock(
         misfit(problem, point).reshape(n, 9),
