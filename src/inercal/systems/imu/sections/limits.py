@@ -1,0 +1,64 @@
+"""Limits by which sections are found in recordings, and by which their names are checked; the book prints them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of the finding of sections; ``LIMITS`` are the ones in force."""
+
+    still_window: float = 0.4
+    """Length [s] of the windows whose variance tells rest from motion."""
+
+    shortest_hold: float = 0.65
+    """Shortest hold [s] that is read."""
+
+    valley_depth: float = 0.6
+    """Height of a valley between two humps of the variances, over that of the lower hump, up to which it is one."""
+
+    hump_windows: float = 4.0
+    """Windows that the peak of a hump holds at least, within half a power of ten of variance."""
+
+    restless_hold: float = 0.05
+    """Standard deviation of specific force in a window, as a part of gravity, from which nothing is held still."""
+
+    drift_in_hold: float = 0.02
+    """Change of the vertical [rad] from the first to the last third of a hold, beyond its noise, from which it is none:
+    the mean of a fan of directions is shorter than gravity by a 24th of its square."""
+
+    drift_sigmas: float = 5.0
+    """Change within a hold, over the u of that change by noise, that is put down to chance."""
+
+    hold_edge: float = 4.0
+    """Change of short means, over their scatter inside a hold, from which the hold is over."""
+
+    hold_edge_power: float = 4.0
+    """Mean square of short stretches about the mean of a hold, over that inside it, from which the hold is over."""
+
+    same_pose: float = 0.05
+    """Change of specific force, as a part of gravity, below which two holds in a row are one pose."""
+
+    harmless_rate: float = 0.05
+    """Rate [rad/s] up to which turning does no harm to the mean of accelerometers: 1e-3 m/s^2 over an arm of 0.4 m."""
+
+    slowest_telling: float = 0.2
+    """Rate of the vertical [rad/s] from which it tells the scale of a gyro in counts."""
+
+    fastest_telling: float = 3.0
+    """Rate of the vertical [rad/s] up to which it does: beyond, the accelerometers feel more than gravity."""
+
+    turning_hold: float = 10.0
+    """Distance of the gyro's mean in a hold from that of the others, over their scatter, from which it turns."""
+
+    holds_to_compare: int = 5
+    """Holds without which the means of the gyro are not compared."""
+
+    side: float = math.radians(20.0)
+    """Angle [rad] from an axis within which a rest may be a side; and two sides within it are one taken twice."""
+
+
+LIMITS = Limits()
+"""The limits in force."""
