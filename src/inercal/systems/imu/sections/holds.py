@@ -265,14 +265,14 @@ def _grown(
         high = min(stop + reach, after, int(min(cuts[cuts >= stop], default=n)))
         first, last = low, high
         for x, harmless in triads:
-            begin, end = _edges(x[low:high], start - low, stop - low, block, harmless)
+            begin, end = still_edges(x[low:high], start - low, stop - low, block, harmless)
             first, last = max(first, low + begin), min(last, low + end)
         if last - first > block:
             grown.append(Dwell(first, last))
     return grown
 
 
-def _edges(x: Array, start: int, stop: int, block: int, harmless: float) -> tuple[int, int]:
+def still_edges(x: Array, start: int, stop: int, block: int, harmless: float) -> tuple[int, int]:
     """The first and the last sample (exclusive) about ``start`` and ``stop`` up to which rows (n, 3) are as inside.
 
     Told by means over a block and by mean squares about the mean, in blocks that begin at every row.

@@ -56,6 +56,13 @@ class Limits:
     holds_to_compare: int = 5
     """Holds without which the means of the gyro are not compared."""
 
+    noise_dof: float = 8.0
+    """Degrees of freedom without which means of a length do not tell the noise."""
+
+    noise_change: float = 2.5
+    """Change of the noise from short to long means, over its u by chance, from which short ones say nothing of long
+    ones."""
+
     side: float = math.radians(20.0)
     """Angle [rad] from an axis within which a rest may be a side; and two sides within it are one taken twice."""
 
