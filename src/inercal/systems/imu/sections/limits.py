@@ -56,6 +56,12 @@ class Limits:
     holds_to_compare: int = 5
     """Holds without which the means of the gyro are not compared."""
 
+    sides_to_compare: int = 4
+    """Rests of known direction without which where they stand is not judged."""
+
+    rate_miss: float = 0.2
+    """Part by which the gyro's reading of a rate or turn may differ from what is stated."""
+
     noise_dof: float = 8.0
     """Degrees of freedom without which means of a length do not tell the noise."""
 
