@@ -63,7 +63,8 @@ def held(seed, how=Handling(), axes=None):
     w = w + how.tremor_rate * shake
     f = f + np.cross(f, how.tremor_rate * np.cumsum(shake, axis=0) * step)
     window = np.hanning(max(round(0.15 / step) | 1, 3))
-    moving = np.convolve(1.0 - np.concatenate(still), window / window.sum(), "same")[:, None]
+    resting = np.concatenate(still)
+    moving = (np.convolve(1.0 - resting, window / window.sum(), "same") * (1.0 - resting))[:, None]
     f = (
         f
         + how.tremor * band(rng, count, step, 6.0, 2.5)

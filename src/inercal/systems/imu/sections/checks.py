@@ -25,7 +25,7 @@ def contradictions(sections: Sequence[Section], gyro_scale: float | None) -> tup
 
     ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other.
     """
-    return (*_of_rests(sections), *_of_rotations(sections, gyro_scale))
+    return (*_of_rests(sections), *_turning_rests(sections), *_of_rotations(sections, gyro_scale))
 
 
 def direction(vector: Array) -> str:
@@ -78,6 +78,25 @@ def _of_rests(sections: Sequence[Section]) -> list[Finding]:
         ]
     wrong = [k for k in range(len(whole)) if cosines[k] < np.cos(LIMITS.side)]
     return [_elsewhere(whole[k], force[k]) for k in wrong]
+
+
+def _turning_rests(sections: Sequence[Section]) -> Iterator[Finding]:
+    """Rests in which the gyro reads something else than in the others."""
+    rests = [
+        one for one in sections if one.kind == "rest" and one.gyro is not None and np.isfinite(one.gyro).all()
+    ]
+    if len(rests) < LIMITS.holds_to_compare:
+        return
+    means = np.array([one.gyro for one in rests])
+    off = np.linalg.norm(means - np.median(means, axis=0), axis=1)
+    for one, size in zip(rests, off, strict=True):
+        if size > LIMITS.turning_rest * float(np.median(off)):
+            yield Finding(
+                "not_at_rest",
+                f"The gyro turns in {one.name}: {size / float(np.median(off)):.0f} times as far off as in other rests.",
+                one.where,
+                action="Take it out, or state it as kind `rate` with its rate.",
+            )
 
 
 def _taken_twice(one: Section, other: Section, whole: Sequence[Section]) -> Finding:
@@ -136,16 +155,17 @@ def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iter
         and one.gyro is not None
         and np.isfinite(one.gyro).all()
         and one.axis is not None
-        and (one.rate if one.kind == "rate" else one.angle) != 0.0
+        and _rate(one) != 0.0
     ]
     if not turning:
         return
-    bias = _bias(sections, turning)
+    bias = _bias(sections, turning, gyro_scale)
+    if bias is None:
+        return
     gains = []
     for one in turning:
         assert one.axis is not None
         assert one.gyro is not None
-        rate = one.rate if one.kind == "rate" else one.angle / one.duration
         off = one.gyro - bias
         k = int(np.argmax(np.abs(off)))
         axis = int(np.argmax(np.abs(one.axis)))
@@ -157,7 +177,7 @@ def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iter
                 action="Correct its name or `axis`, or say in the map which column is which axis of the gyro.",
             )
         else:
-            gains.append((one, float(off @ one.axis) / rate))
+            gains.append((one, float(off @ one.axis) / _rate(one)))
     yield from _of_gains(gains, gyro_scale)
 
 
@@ -200,7 +220,22 @@ def _letter(section: Section) -> str:
     return "" if section.axis is None else direction(section.axis)[1]
 
 
-def _bias(sections: Sequence[Section], turning: Sequence[Section]) -> Array:
-    """Mean output (3,) of the gyro at rest; without rests the middle of all rates."""
+def _bias(sections: Sequence[Section], turning: Sequence[Section], gyro_scale: float | None) -> Array | None:
+    """Mean output (3,) of the gyro at rest; without rests by all rates, in counts where these tell it; else None."""
     rests = [one.gyro for one in sections if one.kind == "rest" and one.gyro is not None]
-    return np.asarray(np.median(rests or [one.gyro for one in turning if one.gyro is not None], axis=0))
+    if rests:
+        return np.asarray(np.median(rests, axis=0))
+    if gyro_scale is not None:
+        return np.zeros(3)
+    if len(turning) < LIMITS.sides_to_compare:
+        return None
+    rates = np.array([_rate(one) * one.axis for one in turning if one.axis is not None])
+    outputs = np.array([one.gyro for one in turning])
+    middle = outputs.mean(axis=0), rates.mean(axis=0)
+    gain = np.sum((outputs - middle[0]) * (rates - middle[1])) / np.sum((rates - middle[1]) ** 2)
+    return np.asarray(middle[0] - gain * middle[1])
+
+
+def _rate(section: Section) -> float:
+    """Mean rate that is stated of a rate or a turn [rad/s]."""
+    return section.rate if section.kind == "rate" else section.angle / section.duration

@@ -53,12 +53,10 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
     acc, gyro : (n, 3) or None
         Outputs in any unit; None: not there. Rows that are not finite are never still.
     """
-    steps = np.diff(t)
-    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-    block = max(round(LIMITS.still_window / _BLOCKS / step), 2) if step else len(t)
+    block = _block(t)
     if len(t) < (_BLOCKS + 1) * block:
         return Holds((), (), ())
-    cuts = breaks(t, 0.5 * LIMITS.still_window + 3.0 * step)
+    cuts, step = _cuts(t), _step(t)
     shortest = max(_BLOCKS, int(LIMITS.shortest_hold / (block * step)) - 1)
     turning = None if gyro is None else _Windows.of(gyro, block, cuts)
     unrest = None if turning is None else turning.unrest()
@@ -92,6 +90,48 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
         kept.append(sound)
         unused += unsound if acc is None else []
     return Holds(kept[0] if acc is not None else (), kept[-1] if gyro is not None else (), tuple(unused))
+
+
+def steady_rates(t: Array, gyro: Array) -> tuple[Dwell, ...]:
+    """Stretches in which a gyro (n, 3) turns steadily: calm, off its output at rest, and without a drift."""
+    block = _block(t)
+    if len(t) < (_BLOCKS + 1) * block:
+        return ()
+    cuts = _cuts(t)
+    windows = _Windows.of(gyro, block, cuts)
+    variance, turning = windows.unrest()
+    calm, moving = _valleys(variance), _valleys(variance + turning)
+    if not moving:
+        return ()
+    still = (variance < (calm or moving)[0]) & (turning > moving[0])
+    found = _grown(
+        [(gyro, 0.0)], windows.stretches(still, int(LIMITS.shortest_rate / _step(t) / block)), block, cuts
+    )
+    rest = windows.middle + windows.at_rest()
+    steady = []
+    for hold in found:
+        third = hold.samples // 3
+        first, last = hold.of(gyro)[:third].mean(axis=0), hold.of(gyro)[-third:].mean(axis=0)
+        if np.linalg.norm(last - first) < LIMITS.steady_rate * np.linalg.norm(0.5 * (first + last) - rest):
+            steady.append(hold)
+    return tuple(steady)
+
+
+def _step(t: Array) -> float:
+    """Median interval [s] of times (n,) that increase; 0 where none does."""
+    steps = np.diff(t)
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+
+
+def _block(t: Array) -> int:
+    """Rows of a block."""
+    step = _step(t)
+    return max(round(LIMITS.still_window / _BLOCKS / step), 2) if step else len(t)
+
+
+def _cuts(t: Array) -> Places:
+    """Rows before which time breaks."""
+    return breaks(t, 0.5 * LIMITS.still_window + 3.0 * _step(t))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +184,9 @@ class _Windows:
 
     def unrest(self) -> tuple[Array, Array]:
         """Variances (m,) of a gyro's windows, and squares (m,) of their means' distance from that at rest."""
-        return self.variance, ((self.means - self._at_rest()) ** 2).sum(axis=1)
+        return self.variance, ((self.means - self.at_rest()) ** 2).sum(axis=1)
 
-    def _at_rest(self) -> Array:
+    def at_rest(self) -> Array:
         """Mean output (3,) at rest: of the calm windows, that to which the instrument comes back most often."""
         known = self.variance[np.isfinite(self.variance)]
         if not len(known):
@@ -289,9 +329,10 @@ def still_edges(x: Array, start: int, stop: int, block: int, harmless: float) ->
         power <= max(LIMITS.hold_edge_power * power[core].mean(), least)
     )
     before, after = np.flatnonzero(off[: core.start]), np.flatnonzero(off[core.stop :])
-    half = block // 2 + 1
-    begin = int(before[-1]) + half if len(before) else 0
-    end = core.stop + int(after[0]) + block - half if len(after) else len(x)
+    # the outermost row of the last block that is off is the first of the motion; a slow one began before
+    margin = 1 + block // 5
+    begin = int(before[-1]) + margin if len(before) else 0
+    end = core.stop + int(after[0]) + block - margin if len(after) else len(x)
     return begin, end
 
 

@@ -155,7 +155,7 @@ def _value(name: str, text: str, where: str) -> object:
             raise StudyError(where, f"found {shown(text)}, expected one of {', '.join(kinds)}")
         return text
     if name in ("up", "axis"):
-        return _direction(text, where)
+        return direction_of(text, where)
     if name == "force":
         return _force(text, where)
     if name in _DIMENSIONS:
@@ -175,7 +175,7 @@ def _quantity(text: str, dimension: str, where: str, example: str) -> Quantity:
         raise StudyError(error.where, error.message) from error
 
 
-def _direction(text: str, where: str) -> Array:
+def direction_of(text: str, where: str) -> Array:
     """``+x``, ``-z`` or three numbers as a unit vector (3,)."""
     if re.fullmatch(r"[+-]?[xyz]", text):
         return np.asarray(np.eye(3)[_LETTERS.index(text[-1])] * (-1.0 if text[0] == "-" else 1.0))
