@@ -173,6 +173,24 @@ def test_a_file_that_turns_all_the_time_is_no_rest():
     assert "about 30 deg/s about +x: which rate?" in found.rows[0].why
 
 
+def test_a_log_that_never_rests_says_so():
+    """A gimbal that never stops, in counts: no rest, and when it was calmest."""
+    rng = np.random.default_rng(15)
+    t = np.arange(20000) / 100.0
+    angle, tilt = 1.3 * t, 0.6 * np.sin(0.37 * t)
+    acc = GRAVITY * np.stack(
+        [np.sin(angle) * np.cos(tilt), np.sin(tilt), np.cos(angle) * np.cos(tilt)], axis=1
+    )
+    gyro = np.stack([np.gradient(tilt, t), np.full_like(t, 1.3), np.zeros_like(t)], axis=1)
+    acc, gyro = (
+        100.0 * acc + 4.0 * rng.normal(size=acc.shape),
+        1000.0 * gyro + 15.0 * rng.normal(size=gyro.shape),
+    )
+    found = guessed({"spin.csv": record_of(t, np.round(acc), np.round(gyro))})
+    assert [row for row in found.rows if row.kind == "rest"] == []
+    assert "spin.csv is never held still for 0.65 s, calmest at" in found.questions[-1].headline
+
+
 def test_the_labels_of_a_shipped_recording():
     """imucal's labels: six sides and three turns whose angle is asked for."""
     record, _ = shipped("ferraris")

@@ -36,11 +36,12 @@ class UnusedHold:
 
 @dataclass(frozen=True)
 class Holds:
-    """Holds in which the accelerometers, and in which the gyros may be read, and stretches of neither."""
+    """Holds in which the accelerometers, and in which the gyros may be read, stretches of neither, the calmest row."""
 
     acc: tuple[Dwell, ...]
     gyro: tuple[Dwell, ...]
     unused: tuple[UnusedHold, ...]
+    calmest: int = 0
 
 
 def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
@@ -89,7 +90,13 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
         sound, unsound = _judged(t, _grown([(gyro, 0.0)], resting, block, cuts), None, gyro, 0.0, block)
         kept.append(sound)
         unused += unsound if acc is None else []
-    return Holds(kept[0] if acc is not None else (), kept[-1] if gyro is not None else (), tuple(unused))
+    calm = windows if acc is not None else turning
+    return Holds(
+        kept[0] if acc is not None else (),
+        kept[-1] if gyro is not None else (),
+        tuple(unused),
+        0 if calm is None else int(np.argmin(calm.variance)) * block,
+    )
 
 
 def steady_rates(t: Array, gyro: Array) -> tuple[Dwell, ...]:

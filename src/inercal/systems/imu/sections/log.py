@@ -46,13 +46,24 @@ def rows_of_log(
     findings = [_unused(file, t, found.unused)] if found.unused else []
     rows = rests
     if rate is not None:
-        steady = [hold for hold in steady_rates(t, rate) if not _overlaps(hold, holds)]
+        # without a rest the output at rate 0 is not known
+        steady = [hold for hold in steady_rates(t, rate) if holds and not _overlaps(hold, holds)]
         steady += [hold for hold in turning if not _overlaps(hold, steady)]
         still = [] if turning else [hold.of(rate).mean(axis=0) for hold in found.gyro]
         middle = np.median(still, axis=0) if still else np.zeros(3)
         plateaus, asked = _plateaus(file, t, rate - middle, steady, gyro_scale)
-        turns, told = _turns(file, t, rate, holds, acc, steady, gyro_scale)
+        sided = any(rest.up is not None for rest in rests)
+        turns, told = _turns(file, t, rate, holds, acc, steady, gyro_scale, sided)
         rows, findings = [*rests, *plateaus, *turns], [*findings, *asked, *told]
+    if not rows:
+        findings.append(
+            Finding(
+                "not_at_rest",
+                f"{file} is never held still for {LIMITS.shortest_hold:g} s, calmest at {t[found.calmest]:.1f} s.",
+                file,
+                action="Hold the instrument still in each pose for a second or more.",
+            )
+        )
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
 
 
@@ -158,8 +169,12 @@ def _turns(
     acc: Samples | None,
     steady: Sequence[Dwell],
     gyro_scale: float | None,
+    sided: bool,
 ) -> tuple[list[SectionRow], list[Finding]]:
-    """Rows of turns about an axis from one hold to the next that leave the vertical where it was."""
+    """Rows of turns about an axis from one hold to the next that leave the vertical where it was.
+
+    Those that are not whole turns are taken for turns only where the holds are ``sided``, all of them on sides.
+    """
     found = list(_rotations(t, rate, holds, acc, steady))
     largest = max((float(np.linalg.norm(rotation)) for _, _, rotation in found), default=0.0)
     rows: list[SectionRow] = []
@@ -180,7 +195,7 @@ def _turns(
             why = f"detected, {360.0 * turns:.0f} deg by the gyro, taken as whole turns"
             rows.append(replace(row, angle=quantity_of(2.0 * np.pi * round(turns), 0.0, "deg"), why=why))
             whole.append(rows[-1].section)
-        else:
+        elif sided:
             about = f"about {360.0 * abs(turns):.0f} deg" if gyro_scale else "a turn"
             rows.append(replace(row, why=f"detected, {about} about {way}: which angle?"))
             asked.append(rows[-1].section)
