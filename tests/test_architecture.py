@@ -194,8 +194,8 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "limits identified recording rows turns settings second_order simulate multiposition means known_rates "
-        "known_turns ferraris sections aided temperature task figures verbs system"
+        "limits identified recording rows turns settings second_order simulate sections multiposition means known_rates "
+        "known_turns ferraris aided temperature task figures verbs system"
     ),
     "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
     "turntable": (
