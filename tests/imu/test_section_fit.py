@@ -4,11 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ferraris_sessions import options_of, record_of
+from section_protocols import poses
 from turned_units import DEG, SIDES, Bench, Unit
 
 from inercal.foundation.geometry.earth import GravityInput, Site
+from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 from inercal.systems.imu.ferraris.method import NAMES as OF_FERRARIS
 from inercal.systems.imu.ferraris.method import Inputs, coefficients
+from inercal.systems.imu.ferraris.names import POSITIONS, TURNS
+from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.sections.calibration import calibrate_sections
 from inercal.systems.imu.sections.outputs import misfit, rows
 from inercal.systems.imu.sections.priors import Priors, Size
@@ -16,6 +21,7 @@ from inercal.systems.imu.sections.problem import problem_of
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import solved
 from inercal.systems.imu.sections.start import first_guess
+from inercal.systems.imu.settings import ImuSettings
 
 
 def site_of(unit):
@@ -187,3 +193,40 @@ def test_means_of_six_sides_give_half_differences():
         value, u, _ = found.value(f"K1_{axis}")
         assert abs(value - want) < 0.1 * u
         assert 2e-4 < u < 2.5e-3
+
+
+def test_poses_of_no_direction_give_what_the_size_of_gravity_gives():
+    """The method of pose means, which has the size of gravity alone; scatter and U are those of Student there."""
+    unit = Unit(np.random.default_rng(11), upper=True, k2=0.0)
+    sections = [replace(s, gyro=None) for s in poses(Bench(unit, stated=False), 24)]
+    found = calibrate_sections(
+        sections, Priors(Site(unit.gravity), k2=0.0, misalignment=1.0, acc_scale=Size(1.0, 1e3))
+    )
+    today = fit_accelerometer(np.array([s.acc for s in sections]), unit.gravity)
+    for name, value in zip(today.names, today.fit.x, strict=True):
+        mine, u, _ = found.value(name)
+        assert abs(mine - value) < 0.05 * u, name
+
+
+def test_a_shipped_session_gives_what_ferraris_gives():
+    """Sides and turns read by today's method, placing and noise told by their own scatter."""
+    record, options = record_of("ferraris-si"), options_of("ferraris-si")
+    site = Site(9.81, (GravityInput("site", 2e-3, "m/s^2", 1.0),))
+    today = calibrate_ferraris(record, ImuSettings(site), options)
+    i, readings = today.readings.inputs, today.readings
+    sections = [
+        Section("rest", name=name, acc=i.force[k], gyro=i.rate[k], up=SIDES[("+" if name[2] == "p" else "-") + name[0]])
+        for k, name in enumerate(POSITIONS)
+    ] + [
+        Section("turn", name=name, gyro=i.turned_rate[k], axis=np.eye(3)[k], up=np.eye(3)[k], angle=float(i.angles[k]),
+                angle_u=2 * DEG, duration=float(i.durations[k]), cosine_sine=tuple(readings.swing[k]))
+        for k, name in enumerate(TURNS)
+    ]  # fmt: skip
+    scale = Size(1.0 / today.gyro.unit.factor, 0.05)
+    found = calibrate_sections(sections, Priors(site, gyro_scale=scale))
+    for name in today.estimate.names:
+        mine, u, _ = found.value(name)
+        other = today.estimate[name]
+        assert abs(mine - other.value) < 0.6 * max(u, other.u), name
+        if name.startswith(("S", "M", "T")):
+            assert 0.75 < u / other.u < 1.1, name

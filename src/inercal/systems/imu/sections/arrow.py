@@ -159,6 +159,7 @@ class Linear:
         band = flat.reshape(self.width + 1, inside)
         if inside:
             band[0] += weight[s:]
+            band[0] = np.where(band[0] > 0.0, band[0], 1.0)  # tilts of a section that is left out
             scale = 1.0 / np.sqrt(band[0])
             for k in range(self.width + 1):
                 band[k, : inside - k] *= scale[: inside - k] * scale[k:]
