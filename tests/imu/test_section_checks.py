@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inercal.systems.imu.sections.checks import contradictions
+from inercal.systems.imu.sections.cutting.checks import contradictions
 from inercal.systems.imu.sections.section import Section
 
 GAIN, BIAS = 1670.0, np.array([570.0, -20.0, 640.0])  # counts

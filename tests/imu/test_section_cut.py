@@ -8,16 +8,22 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from test_section_holds import variants
 
-from inercal.systems.imu.sections.cut import Samples, Stretch, cut, motion_between_rests, variances_of_means
-from inercal.systems.imu.sections.holds import holds_of
-from inercal.systems.imu.sections.table import SectionRow, quantity_of
+from inercal.systems.imu.sections.cutting.cut import (
+    Stretch,
+    TriadSamples,
+    cut,
+    motion_between_rests,
+    variances_of_means,
+)
+from inercal.systems.imu.sections.cutting.holds import holds_of
+from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of
 
 RATE = 100.0
 
 
 def samples(t, values, clipped=None):
     none = np.zeros(len(t), dtype=bool)
-    return Samples(np.asarray(t), np.asarray(values), none if clipped is None else clipped)
+    return TriadSamples(np.asarray(t), np.asarray(values), none if clipped is None else clipped)
 
 
 def noises(rng, kind, count, length):

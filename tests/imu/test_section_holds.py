@@ -6,7 +6,7 @@ from held_recordings import GRAVITY, Handling, held
 from recordings import arrays, shipped
 from scipy.spatial.transform import Rotation
 
-from inercal.systems.imu.sections.holds import holds_of
+from inercal.systems.imu.sections.cutting.holds import holds_of
 
 TABLE = Handling(20, rest=(5.0, 6.0), tremor=0.0, tremor_rate=0.0, noise=2e-3, gyro_noise=1e-4)
 SMOOTH = Handling(24, rest=(2.0, 3.0), move=(2.0, 3.0), tremor=0.0, tremor_rate=0.0, jolt=0.0, noise=0.01)

@@ -5,7 +5,7 @@ import pytest
 
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import parse_quantity
-from inercal.systems.imu.sections.table import (
+from inercal.systems.imu.sections.cutting.table import (
     COLUMNS,
     SectionRow,
     of_tables,

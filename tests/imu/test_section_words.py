@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from inercal.foundation.units import parse_quantity
-from inercal.systems.imu.sections.words import claim
+from inercal.systems.imu.sections.cutting.words import claim
 
 NAMES = Path(__file__).parents[1] / "data" / "sections" / "names.csv"
 

@@ -6,9 +6,9 @@ from held_recordings import GRAVITY, Handling, held
 from recordings import record_of, shipped
 
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.systems.imu.sections.guess import guessed
-from inercal.systems.imu.sections.means import Means, rows_of_means, sections_of_means
-from inercal.systems.imu.sections.table import read_table, side_of, write_table
+from inercal.systems.imu.sections.cutting.means import Means, rows_of_means, sections_of_means
+from inercal.systems.imu.sections.cutting.proposal import Proposal
+from inercal.systems.imu.sections.cutting.table import read_table, side_of, write_table
 
 K0, K1, D_F = np.array([570.0, -20.0, 640.0]), 1672.0, np.array([-560.0, 110.0, -73.0])
 SIDES = {
@@ -37,7 +37,7 @@ def six(**changed):
 
 def test_six_files_by_their_names(tmp_path):
     """Each is one rest on its side, from their means come the constants; the table says the same."""
-    found = guessed(six(**{"posX.csv": file_of([1.0, 0.0, 0.0], 7, hand=2.0)}))
+    found = Proposal.of(six(**{"posX.csv": file_of([1.0, 0.0, 0.0], 7, hand=2.0)}))
     assert found.questions == ()
     assert found.unused == {}
     assert {row.file: side_of(row.up) for row in found.rows} == {
@@ -58,13 +58,13 @@ def test_six_files_by_their_names(tmp_path):
 
 
 def test_a_side_taken_twice_is_asked_for_alone():
-    found = guessed(six(**{"negZ.csv": file_of([0.0, 0.0, 1.0], 8)}))
+    found = Proposal.of(six(**{"negZ.csv": file_of([0.0, 0.0, 1.0], 8)}))
     (question,) = found.questions
     assert "posZ and negZ hold the same side, which looks like that of posZ" in question.headline
 
 
 def test_a_file_that_never_rests_is_named_and_left_out():
-    found = guessed(six(**{"posY.csv": file_of([0.0, 1.0, 0.0], 9, hand=6.0)}))
+    found = Proposal.of(six(**{"posY.csv": file_of([0.0, 1.0, 0.0], 9, hand=6.0)}))
     assert [one.name for one in found.sections] == ["posX", "negX", "negY", "posZ", "negZ"]
     (question,) = found.questions
     assert question.code == "not_at_rest"
@@ -72,7 +72,7 @@ def test_a_file_that_never_rests_is_named_and_left_out():
 
 
 def test_a_rest_by_name_that_turns_is_named():
-    found = guessed(six(**{"negX.csv": file_of([-1.0, 0.0, 0.0], 10, rate=(0.5, 0.0, 0.0))}))
+    found = Proposal.of(six(**{"negX.csv": file_of([-1.0, 0.0, 0.0], 10, rate=(0.5, 0.0, 0.0))}))
     (question,) = found.questions
     assert question.code == "not_at_rest"
     assert "The gyro turns in negX" in question.headline
@@ -86,7 +86,7 @@ def test_rates_and_turns_by_name():
     steady = gyro * [1.0, 1.0, 0.0]
     steady[:, 2] = np.radians(30.0)
     spin = record_of(t, acc, steady + 1e-3 * np.sin(np.arange(len(t)))[:, None], "m/s^2", "rad/s")
-    found = guessed({"z_360.csv": turn, "z_30dps.csv": spin, "rot_z.csv": turn})
+    found = Proposal.of({"z_360.csv": turn, "z_30dps.csv": spin, "rot_z.csv": turn})
     kinds = [("z_360", "turn"), ("z_30dps", "rate"), ("rot_z", "turn")]
     assert [(row.section, row.kind) for row in found.rows] == kinds
     assert [one.name for one in found.sections] == ["z_360", "z_30dps"]
@@ -113,7 +113,7 @@ def six_sides_and_three_turns(seed, counts=False):
 @pytest.mark.parametrize("seed", range(3))
 def test_one_log_with_six_sides_and_three_turns(seed):
     record, truth = six_sides_and_three_turns(seed)
-    found = guessed({"log.csv": record})
+    found = Proposal.of({"log.csv": record})
     rests = [row for row in found.rows if row.kind == "rest"]
     turns = [row for row in found.rows if row.kind == "turn"]
     assert len(rests) == len(truth) == 9
@@ -127,7 +127,7 @@ def test_one_log_with_six_sides_and_three_turns(seed):
 
 def test_the_angle_of_turns_in_counts_is_asked_for():
     record, _ = six_sides_and_three_turns(1, counts=True)
-    found = guessed({"log.csv": record})
+    found = Proposal.of({"log.csv": record})
     assert [row.angle for row in found.rows if row.kind == "turn"] == [None] * 3
     assert [question.code for question in found.questions] == ["not_stated"]
     assert len(found.unused) == 3
@@ -135,7 +135,7 @@ def test_the_angle_of_turns_in_counts_is_asked_for():
 
 def test_poses_in_the_hand_are_no_sides():
     t, acc, gyro, _ = held(21)
-    found = guessed({"log.csv": record_of(t, acc, gyro, "m/s^2", "rad/s")})
+    found = Proposal.of({"log.csv": record_of(t, acc, gyro, "m/s^2", "rad/s")})
     assert len(found.sections) >= 50
     assert all(one.up is None for one in found.sections)
 
@@ -150,7 +150,7 @@ def test_plateaus_of_a_rate_are_one_question_for_each_size():
         size=(len(rate), 3)
     )
     acc = np.array([0.0, 0.0, GRAVITY]) + 0.02 * rng.normal(size=gyro.shape)
-    found = guessed({"log.csv": record_of(np.arange(len(rate)) / 100.0, acc, gyro, "m/s^2", "rad/s")})
+    found = Proposal.of({"log.csv": record_of(np.arange(len(rate)) / 100.0, acc, gyro, "m/s^2", "rad/s")})
     plateaus = [row for row in found.rows if row.kind == "rate"]
     assert [side_of(row.axis) for row in plateaus] == ["+z", "-z", "+z", "-z", "+z"]
     assert [row.rate_group for row in plateaus] == [f"log.csv {k}" for k in (1, 1, 2, 2, 1)]
@@ -168,7 +168,7 @@ def test_a_file_that_turns_all_the_time_is_no_rest():
     rng = np.random.default_rng(13)
     gyro = np.array([np.radians(30.0), 0.0, 0.0]) + 2e-3 * rng.normal(size=(3000, 3))
     acc = np.array([GRAVITY, 0.0, 0.0]) + 0.02 * rng.normal(size=(3000, 3))
-    found = guessed({"x_up_gyro.csv": record_of(np.arange(3000) / 100.0, acc, gyro, "m/s^2", "rad/s")})
+    found = Proposal.of({"x_up_gyro.csv": record_of(np.arange(3000) / 100.0, acc, gyro, "m/s^2", "rad/s")})
     assert [row.kind for row in found.rows] == ["rate"]
     assert "about 30 deg/s about +x: which rate?" in found.rows[0].why
 
@@ -186,7 +186,7 @@ def test_a_log_that_never_rests_says_so():
         100.0 * acc + 4.0 * rng.normal(size=acc.shape),
         1000.0 * gyro + 15.0 * rng.normal(size=gyro.shape),
     )
-    found = guessed({"spin.csv": record_of(t, np.round(acc), np.round(gyro))})
+    found = Proposal.of({"spin.csv": record_of(t, np.round(acc), np.round(gyro))})
     assert [row for row in found.rows if row.kind == "rest"] == []
     assert "spin.csv is never held still for 0.65 s, calmest at" in found.questions[-1].headline
 
@@ -194,7 +194,7 @@ def test_a_log_that_never_rests_says_so():
 def test_the_labels_of_a_shipped_recording():
     """imucal's labels: six sides and three turns whose angle is asked for."""
     record, _ = shipped("ferraris")
-    found = guessed({"ferraris.csv": record})
+    found = Proposal.of({"ferraris.csv": record})
     rests = [row for row in found.rows if row.kind == "rest"]
     assert sorted(side_of(row.up) for row in rests) == ["+x", "+y", "+z", "-x", "-y", "-z"]
     assert [row.section for row in found.rows if row.kind == "turn"] == ["x_rot", "y_rot", "z_rot"]
@@ -207,7 +207,7 @@ def test_rows_of_means_with_true_directions():
     acc = K0 + K1 * GRAVITY * ups
     for true, in_si in ((ups, False), (ups, True), (9.80665 * ups, True)):
         means = Means(acc, acc_u=np.full((6, 3), 2.0), true=true, in_si=in_si)
-        found = guessed({"means.csv": record_of(np.arange(6), acc)}, {"means.csv": means})
+        found = Proposal.of({"means.csv": record_of(np.arange(6), acc)}, {"means.csv": means})
         assert [side_of(row.up) for row in found.rows] == ["+x", "+y", "+z", "-x", "-y", "-z"]
         assert found.sections[0].acc_var.tolist() == [4.0, 4.0, 4.0]
         assert found.questions == ()
@@ -223,9 +223,20 @@ def test_rows_of_means_without_directions_or_times():
     ups = rng.normal(size=(12, 3))
     acc = K0 + K1 * GRAVITY * ups / np.linalg.norm(ups, axis=1, keepdims=True)
     acc[3] = np.nan
-    found = guessed({"rows.csv": record_of(np.arange(12), acc)})
+    found = Proposal.of({"rows.csv": record_of(np.arange(12), acc)})
     assert [one.name for one in found.sections] == [f"row {k}" for k in (1, 2, 3, *range(5, 13))]
     assert all(one.up is None for one in found.sections)
+
+
+def test_rows_of_two_tables_are_told_apart():
+    rng = np.random.default_rng(16)
+    tables = {}
+    for name in ("a.csv", "b.csv"):
+        acc = K0 + K1 * GRAVITY * np.concatenate([np.eye(3), -np.eye(3)]) + rng.normal(size=(6, 3))
+        tables[name] = record_of(np.arange(6), acc)
+    found = Proposal.of(tables)
+    assert len({row.section for row in found.rows}) == 12
+    assert {one.name for one in found.sections} == {row.section for row in found.rows}
 
 
 def test_bad_input_is_one_sentence():
@@ -234,4 +245,4 @@ def test_bad_input_is_one_sentence():
     record, _ = shipped("ferraris")
     bare = type(record)({"acc_x": record["acc_x"]}, (), record.sources)
     with pytest.raises(RecordError, match="neither three accelerometers nor three gyros"):
-        guessed({"x.csv": bare})
+        Proposal.of({"x.csv": bare})

@@ -15,6 +15,9 @@ class Limits:
     still_window: float = 0.4
     """Length [s] of the windows whose variance tells rest from motion."""
 
+    blocks_of_window: int = 4
+    """Blocks of a window: windows begin at every block."""
+
     shortest_hold: float = 0.65
     """Shortest hold [s] that is read."""
 
@@ -93,6 +96,9 @@ class Limits:
 
     largest_bias: float = math.radians(20.0)
     """Output of a gyro [rad/s] up to which it may be its bias; a steady one beyond is a rate."""
+
+    known_gravity: float = 0.01
+    """Difference of a stated size from that of gravity, as a part of it, up to which it is a direction alone."""
 
     noise_dof: float = 8.0
     """Degrees of freedom without which means of a length do not tell the noise."""

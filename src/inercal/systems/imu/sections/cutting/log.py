@@ -11,15 +11,15 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted
-from inercal.systems.imu.sections.checks import direction
-from inercal.systems.imu.sections.cut import Samples
-from inercal.systems.imu.sections.holds import UnusedHold, holds_of, steady_rates
-from inercal.systems.imu.sections.limits import LIMITS
-from inercal.systems.imu.sections.table import SectionRow, quantity_of
+from inercal.systems.imu.sections.cutting.checks import direction
+from inercal.systems.imu.sections.cutting.cut import TriadSamples
+from inercal.systems.imu.sections.cutting.holds import UnusedHold, holds_of, steady_rates
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of
 
 
 def rows_of_log(
-    file: str, acc: Samples | None, gyro: Samples | None, gyro_scale: float | None
+    file: str, acc: TriadSamples | None, gyro: TriadSamples | None, gyro_scale: float | None
 ) -> tuple[list[SectionRow], list[Finding]]:
     """Rows found in a log, and what is asked or said of them.
 
@@ -67,7 +67,7 @@ def rows_of_log(
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
 
 
-def on_clock(samples: Samples, t: Array) -> Array:
+def on_clock(samples: TriadSamples, t: Array) -> Array:
     """Outputs (n, 3) at times (n,) of another clock; NaN outside."""
     if samples.t is t or np.array_equal(samples.t, t):
         return samples.values
@@ -166,7 +166,7 @@ def _turns(
     t: Array,
     rate: Array,
     holds: Sequence[Dwell],
-    acc: Samples | None,
+    acc: TriadSamples | None,
     steady: Sequence[Dwell],
     gyro_scale: float | None,
     sided: bool,
@@ -222,7 +222,7 @@ def _turns(
 
 
 def _rotations(
-    t: Array, rate: Array, holds: Sequence[Dwell], acc: Samples | None, steady: Sequence[Dwell]
+    t: Array, rate: Array, holds: Sequence[Dwell], acc: TriadSamples | None, steady: Sequence[Dwell]
 ) -> Iterator[tuple[Dwell, Dwell, Array]]:
     """Two holds in a row with the same vertical, and the integral (3,) of the gyro's output, less its bias, between."""
     means = None if acc is None else np.array([hold.of(acc.values).mean(axis=0) for hold in holds])

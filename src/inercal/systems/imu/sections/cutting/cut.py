@@ -13,27 +13,27 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import coarse_steps
-from inercal.systems.imu.sections.holds import still_edges
-from inercal.systems.imu.sections.limits import LIMITS as FINDING
+from inercal.systems.imu.sections.cutting.holds import still_edges
+from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
+from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.table import SectionRow
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of a triad: times (n,) [s], outputs (n, 3), and those (n,) with an axis at the end of its range."""
+class TriadSamples:
+    """TriadSamples of a triad: times (n,) [s], outputs (n, 3), and those (n,) with an axis at the end of its range."""
 
     t: Array
     values: Array
     clipped: NDArray[np.bool_]
 
-    def between(self, begin: float | None, end: float | None) -> Samples:
+    def between(self, begin: float | None, end: float | None) -> TriadSamples:
         """Those that are whole, from ``begin`` to ``end`` [s]; None: from the first, to the last."""
         kept = np.isfinite(self.t) & np.isfinite(self.values).all(axis=1)
         kept &= (self.t >= (-np.inf if begin is None else begin)) & (
             self.t <= (np.inf if end is None else end)
         )
-        return Samples(self.t[kept], self.values[kept], self.clipped[kept])
+        return TriadSamples(self.t[kept], self.values[kept], self.clipped[kept])
 
     @property
     def step(self) -> float:
@@ -47,8 +47,8 @@ class Stretch:
     """A stretch of a recording and the row that says what is known of it; None: the triad is not there."""
 
     row: SectionRow
-    acc: Samples | None
-    gyro: Samples | None
+    acc: TriadSamples | None
+    gyro: TriadSamples | None
 
 
 @dataclass(frozen=True)

@@ -14,19 +14,19 @@ from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import RAW
 from inercal.systems.imu.rows import is_counted
-from inercal.systems.imu.sections.checks import contradictions
-from inercal.systems.imu.sections.cut import Samples, Stretch, cut
-from inercal.systems.imu.sections.holds import holds_of, steady_rates
-from inercal.systems.imu.sections.limits import LIMITS
-from inercal.systems.imu.sections.log import on_clock, rows_of_log
-from inercal.systems.imu.sections.means import Means, rows_of_means, sections_of_means
+from inercal.systems.imu.sections.cutting.checks import contradictions
+from inercal.systems.imu.sections.cutting.cut import Stretch, TriadSamples, cut
+from inercal.systems.imu.sections.cutting.holds import holds_of, steady_rates
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+from inercal.systems.imu.sections.cutting.log import on_clock, rows_of_log
+from inercal.systems.imu.sections.cutting.means import Means, rows_of_means, sections_of_means
+from inercal.systems.imu.sections.cutting.table import SectionRow, direction_of, quantity_of
+from inercal.systems.imu.sections.cutting.words import Claim, claim
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.table import SectionRow, direction_of, quantity_of
-from inercal.systems.imu.sections.words import Claim, claim
 
 
 @dataclass(frozen=True)
-class Guess:
+class Proposal:
     """Rows of ``sections.csv``, the sections that they give, those of no use with the reason, and what is asked."""
 
     rows: tuple[SectionRow, ...]
@@ -34,53 +34,60 @@ class Guess:
     unused: dict[str, str]
     questions: tuple[Finding, ...]
 
+    @staticmethod
+    def of(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Proposal:
+        """Sections of recordings, given by the names of their files, and questions about them.
+
+        Labels of a recording tell its sections, else its name, else what is found in it: rests, steady rates, turns.
+        Rows without times are means of poses; ``means`` gives those whose directions or scatter are known.
+
+        Raises
+        ------
+        RecordError
+            A recording has neither accelerometers nor gyros.
+        """
+        means = means or {}
+        files = [_recorded(name, record) for name, record in records.items()]
+        tables = {
+            file.name: Means(_values(file.acc), _values(file.gyro))
+            for file in files
+            if is_counted(file.record)
+        } | dict(means)
+        told: list[SectionRow] = []
+        questions: list[Finding] = []
+        for file in files:
+            if file.name in tables:
+                told += rows_of_means(file.name, tables[file.name])
+            else:
+                found, asked = _rows(file)
+                told += found
+                questions += asked
+        rows = _named_apart(told, several=len(files) > 1)
+        sections: list[Section] = []
+        for name, table in tables.items():
+            sections += sections_of_means([row for row in rows if row.file == name], table)
+        recorded = {file.name: (file.acc, file.gyro) for file in files if file.name not in tables}
+        done = cut(stretches_of(rows, recorded))
+        sections += done.sections
+        scales = {_scale(file.record) for file in files if file.gyro is not None}
+        scale = scales.pop() if len(scales) == 1 else None
+        return Proposal(
+            tuple(rows), tuple(sections), done.unused, (*questions, *contradictions(sections, scale))
+        )
+
 
 @dataclass(frozen=True, eq=False)
-class _File:
+class _Recorded:
     """A recording by name, with its triads."""
 
     name: str
     record: Record
-    acc: Samples | None
-    gyro: Samples | None
-
-
-def guessed(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Guess:
-    """What recordings by the name of their files say of sections.
-
-    Labels of a recording tell its sections, else its name, else what is found in it: rests, steady rates, turns. Rows
-    without times are means of poses; ``means`` gives those whose directions or scatter are known.
-
-    Raises
-    ------
-    RecordError
-        A recording has neither accelerometers nor gyros.
-    """
-    means = means or {}
-    files = [_file(name, record) for name, record in records.items()]
-    rows: list[SectionRow] = []
-    sections: list[Section] = []
-    questions: list[Finding] = []
-    for file in files:
-        if file.name in means or is_counted(file.record):
-            table = means.get(file.name) or Means(_values(file.acc), _values(file.gyro))
-            told = rows_of_means(file.name, table)
-            sections += sections_of_means(told, table)
-        else:
-            told, asked = _rows(file)
-            questions += asked
-        rows += told
-    rows = _named_apart(rows, several=len(files) > 1)
-    by_name = {file.name: file for file in files if not (file.name in means or is_counted(file.record))}
-    done = cut(stretches_of(rows, {name: (file.acc, file.gyro) for name, file in by_name.items()}))
-    sections += done.sections
-    scales = {_scale(file.record) for file in files if file.gyro is not None}
-    scale = scales.pop() if len(scales) == 1 else None
-    return Guess(tuple(rows), tuple(sections), done.unused, (*questions, *contradictions(sections, scale)))
+    acc: TriadSamples | None
+    gyro: TriadSamples | None
 
 
 def stretches_of(
-    rows: Sequence[SectionRow], files: Mapping[str, tuple[Samples | None, Samples | None]]
+    rows: Sequence[SectionRow], files: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]]
 ) -> list[Stretch]:
     """The stretches that rows are of, in recordings given as accelerometers and gyros by name.
 
@@ -97,7 +104,7 @@ def stretches_of(
     ]
 
 
-def _rows(file: _File) -> tuple[list[SectionRow], list[Finding]]:
+def _rows(file: _Recorded) -> tuple[list[SectionRow], list[Finding]]:
     """Rows of a recording by its labels, its name, or what is found in it."""
     clock = file.acc or file.gyro
     assert clock is not None
@@ -116,7 +123,7 @@ def _rows(file: _File) -> tuple[list[SectionRow], list[Finding]]:
     return [_at_its_rate(file, row) if row.kind == "rate" else row], asked
 
 
-def _at_its_rate(file: _File, row: SectionRow) -> SectionRow:
+def _at_its_rate(file: _Recorded, row: SectionRow) -> SectionRow:
     """A file that holds one rate by its name: its longest stretch at a steady rate, where it has others as well."""
     steady = () if file.gyro is None else steady_rates(file.gyro.t, file.gyro.values)
     if file.gyro is None or not steady:
@@ -125,7 +132,7 @@ def _at_its_rate(file: _File, row: SectionRow) -> SectionRow:
     return replace(row, begin=float(t[longest.start]), end=float(t[longest.stop - 1]))
 
 
-def _held(file: _File, clock: Samples, row: SectionRow) -> tuple[list[SectionRow], list[Finding]]:
+def _held(file: _Recorded, clock: TriadSamples, row: SectionRow) -> tuple[list[SectionRow], list[Finding]]:
     """A file that holds one rest by its name: its longest hold; a finding where there is none."""
     gyro = None if file.gyro is None else on_clock(file.gyro, clock.t)
     found = holds_of(clock.t, None if file.acc is None else file.acc.values, gyro)
@@ -140,7 +147,7 @@ def _held(file: _File, clock: Samples, row: SectionRow) -> tuple[list[SectionRow
     return [row if whole else replace(row, begin=begin, end=end)], []
 
 
-def _labelled(file: _File, clock: Samples) -> list[SectionRow]:
+def _labelled(file: _Recorded, clock: TriadSamples) -> list[SectionRow]:
     """A row for each run of one label that says something; labels that say nothing are none."""
     labels = np.array(file.record.labels)
     starts = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist()]
@@ -188,24 +195,24 @@ def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
     return named
 
 
-def _file(name: str, record: Record) -> _File:
+def _recorded(name: str, record: Record) -> _Recorded:
     """A recording with its triads; raises `RecordError` where it has none."""
     acc, gyro = _samples(record, "acc"), _samples(record, "gyro")
     if acc is None and gyro is None:
         raise RecordError(name, "found neither three accelerometers nor three gyros, expected one of the two")
-    return _File(name, record, acc, gyro)
+    return _Recorded(name, record, acc, gyro)
 
 
-def _samples(record: Record, sensor: str) -> Samples | None:
+def _samples(record: Record, sensor: str) -> TriadSamples | None:
     """A triad of a record; None where it is not whole."""
     if all(f"{sensor}_{axis}" in record for axis in "xyz"):
         triad = record.triad(sensor)
         clipped = np.any([at_ends(values) for values in triad.values.T], axis=0)
-        return Samples(triad.t, triad.values, np.asarray(clipped))
+        return TriadSamples(triad.t, triad.values, np.asarray(clipped))
     return None
 
 
-def _values(samples: Samples | None) -> np.ndarray | None:
+def _values(samples: TriadSamples | None) -> np.ndarray | None:
     """The outputs (n, 3) of a triad."""
     return None if samples is None else samples.values
 

@@ -1,7 +1,7 @@
-"""What a name says of its section: that of a file, its folders, a label, a variable of a MAT file or a sheet.
+"""The reading of names of sections: that of a file, its folders, a label, a variable of a MAT file or a sheet.
 
-A name is a hypothesis that data confirm (`inercal.systems.imu.sections.checks`). So one that may be read in two ways
-says nothing: a date, the number of a recording, ``y_axis``, ``tilt-around-x``, ``360ccw``, ``x_up_gyro``.
+A name is a hypothesis that data confirm (`inercal.systems.imu.sections.cutting.checks`). So one that may be read in
+two ways says nothing: a date, the number of a recording, ``y_axis``, ``tilt-around-x``, ``360ccw``, ``x_up_gyro``.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _TOKEN = re.compile(
 
 @dataclass(frozen=True)
 class Claim:
-    """What a name says: ``up`` and ``axis`` as ``+x``, empty where it says nothing; SI."""
+    """Words of a name, understood: ``up`` and ``axis`` as ``+x``, empty where it says nothing; SI."""
 
     kind: Kind | Literal[""] = ""
     up: str = ""
@@ -60,7 +60,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class _Facts:
-    """What stands in a name: axis, its sign and which end of it is up, numbers as (value, unit), other words."""
+    """Content of a name: axis, its sign and which end of it is up, numbers as (value, unit), other words."""
 
     axes: frozenset[str] = frozenset()
     sign: int = 0
@@ -74,7 +74,7 @@ class _Facts:
 
 
 def claim(name: str) -> Claim:
-    """What a name says; of a path what the file's own name leaves open is told by its two nearest folders."""
+    """The claim of a name; of a path what the file's own name leaves open is told by its two nearest folders."""
     *folders, own = name.replace("\\", "/").strip("/ ").rsplit("/", 2)
     facts = _facts(re.sub(r"(\.[A-Za-z][A-Za-z0-9]{1,6})+$", "", own))
     for folder in reversed(folders):
@@ -125,7 +125,7 @@ def _concluded(facts: _Facts) -> Claim:
 
 
 def _facts(text: str) -> _Facts:
-    """What stands in one name."""
+    """Content of one name."""
     tokens = _tokens(text)
     axes, words, numbers = set(), set(), []
     sign = side = 0

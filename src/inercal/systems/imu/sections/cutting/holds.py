@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.dwells import Dwell, breaks, static_intervals
-from inercal.systems.imu.sections.limits import LIMITS
-
-_BLOCKS = 4
-"""Blocks of a window: windows begin at every block."""
+from inercal.systems.imu.sections.cutting.limits import LIMITS
 
 Bools = NDArray[np.bool_]
 Places = NDArray[np.int64]
@@ -55,10 +52,10 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
         Outputs in any unit; None: not there. Rows that are not finite are never still.
     """
     block = _block(t)
-    if len(t) < (_BLOCKS + 1) * block:
+    if len(t) < (LIMITS.blocks_of_window + 1) * block:
         return Holds((), (), ())
     cuts, step = _cuts(t), _step(t)
-    shortest = max(_BLOCKS, int(LIMITS.shortest_hold / (block * step)) - 1)
+    shortest = max(LIMITS.blocks_of_window, int(LIMITS.shortest_hold / (block * step)) - 1)
     turning = None if gyro is None else _Windows.of(gyro, block, cuts)
     unrest = None if turning is None else turning.unrest()
     gates = [] if unrest is None else _valleys(unrest[0] + unrest[1])
@@ -102,7 +99,7 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
 def steady_rates(t: Array, gyro: Array) -> tuple[Dwell, ...]:
     """Stretches in which a gyro (n, 3) turns steadily: calm, off its output at rest, and without a drift."""
     block = _block(t)
-    if len(t) < (_BLOCKS + 1) * block:
+    if len(t) < (LIMITS.blocks_of_window + 1) * block:
         return ()
     cuts = _cuts(t)
     windows = _Windows.of(gyro, block, cuts)
@@ -133,7 +130,7 @@ def _step(t: Array) -> float:
 def _block(t: Array) -> int:
     """Rows of a block."""
     step = _step(t)
-    return max(round(LIMITS.still_window / _BLOCKS / step), 2) if step else len(t)
+    return max(round(LIMITS.still_window / LIMITS.blocks_of_window / step), 2) if step else len(t)
 
 
 def _cuts(t: Array) -> Places:
@@ -164,7 +161,7 @@ class _Windows:
         rows = (x[: count * block] - middle).reshape(count, block, -1)
         sums, squares = rows.sum(axis=1), np.einsum("ijk,ijk->i", rows, rows)
         total, power = (_sums_of_windows(values) for values in (sums, squares))
-        size = _BLOCKS * block
+        size = LIMITS.blocks_of_window * block
         variance = np.maximum(power - (total**2).sum(axis=1) / size, 0.0) / (size - 1)
         begins = np.arange(len(variance)) * block
         inside = np.searchsorted(cuts, begins + size) > np.searchsorted(cuts, begins, side="right")
@@ -211,7 +208,7 @@ class _Windows:
     def stretches(self, still: Bools, shortest: int) -> list[Dwell]:
         """Runs of blocks, at least so many, that lie in windows which are still (m,)."""
         inside = np.zeros(len(self.blocks), dtype=bool)
-        for k in range(_BLOCKS):
+        for k in range(LIMITS.blocks_of_window):
             inside[k : k + len(still)] |= still
         return list(static_intervals(inside, self.breaks, shortest))
 
@@ -245,8 +242,8 @@ def _worth(gate: float, poses: int, blocks: int) -> tuple[int, float, int]:
 
 def _sums_of_windows(values: Array) -> Array:
     """Sums over each window of its blocks' values (k, ...)."""
-    stop = len(values) - _BLOCKS + 1
-    return np.asarray(sum(values[k : stop + k] for k in range(_BLOCKS)))
+    stop = len(values) - LIMITS.blocks_of_window + 1
+    return np.asarray(sum(values[k : stop + k] for k in range(LIMITS.blocks_of_window)))
 
 
 def _valleys(sizes: Array) -> list[float]:
@@ -281,16 +278,17 @@ def _harmless(windows: _Windows, turning: Array, time: float) -> float:
     The scale of a gyro in counts is told by how fast the vertical turns where the gyro does: ``turning`` (m,) are
     squares of its mean output in windows that begin every ``time`` [s]. 0 where it never does.
     """
-    change = np.linalg.norm(windows.means[2 * _BLOCKS :] - windows.means[: -2 * _BLOCKS], axis=1)
-    rate = change / windows.gravity / (2 * _BLOCKS * time)
-    output = np.sqrt(turning[_BLOCKS:-_BLOCKS])
+    lag = 2 * LIMITS.blocks_of_window
+    change = np.linalg.norm(windows.means[lag:] - windows.means[:-lag], axis=1)
+    rate = change / windows.gravity / (lag * time)
+    output = np.sqrt(turning[lag // 2 : -lag // 2])
     told = (
         (rate > LIMITS.slowest_telling)
         & (rate < LIMITS.fastest_telling)
         & np.isfinite(output)
         & (output > 0.0)
     )
-    if np.count_nonzero(told) < 2 * _BLOCKS:
+    if np.count_nonzero(told) < 2 * LIMITS.blocks_of_window:
         return 0.0
     return float((LIMITS.harmless_rate * np.median(output[told] / rate[told])) ** 2)
 
@@ -306,7 +304,7 @@ def _grown(
     grown: list[Dwell] = []
     for k, stretch in enumerate(stretches):
         start, stop = stretch.start * block, stretch.stop * block
-        reach = (_BLOCKS + 1) * block
+        reach = (LIMITS.blocks_of_window + 1) * block
         low = max(start - reach, grown[-1].stop if grown else 0, int(max(cuts[cuts <= start], default=0)))
         after = stretches[k + 1].start * block if k + 1 < len(stretches) else n
         high = min(stop + reach, after, int(min(cuts[cuts >= stop], default=n)))

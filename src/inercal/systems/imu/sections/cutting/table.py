@@ -27,8 +27,8 @@ _DIMENSIONS = {
     "begin": ("time", "s"), "end": ("time", "s"), "rate": ("rate", "deg/s"), "angle": ("angle", "deg"),
     "placing": ("angle", "deg"), "level": ("angle", "deg"), "temperature": ("temperature", "degC"),
 }  # fmt: skip
-_ZERO_CELSIUS = 273.15
 _LETTERS = "xyz"
+_KELVIN = parse_unit("K")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class SectionRow:
     temperature: float | None = None
     """Temperature [K]."""
     why: str = ""
-    """Where what is known comes from: name, label, row, how it was detected, or what is to be answered."""
+    """Source of what is known: name, label, row, how it was detected; or what is to be answered."""
 
 
 COLUMNS = tuple(field.name for field in fields(SectionRow))
@@ -81,48 +81,48 @@ def read_table(path: str | Path) -> tuple[SectionRow, ...]:
         why = getattr(error, "strerror", None) or "not UTF-8 text"
         raise StudyError(path, f"cannot be read ({why}), {expected}") from error
     lines = csv.reader(text.splitlines(), strict=True)
-    rows, places = [], []
+    tables: list[dict[str, str]] = []
+    places: list[str] = []
     try:
         head = [cell.strip() for cell in next(lines, [])]
         for name in head:
             if name not in COLUMNS or head.count(name) > 1:
-                twice = " a second time" if name in COLUMNS else ""
-                raise StudyError(
-                    f"{path}, line 1",
-                    f"found the column {shown(name)}{twice}, expected once each of {', '.join(COLUMNS)}",
-                )
+                found = f"found the column {shown(name)}{' a second time' if name in COLUMNS else ''}"
+                raise StudyError(f"{path}, line 1", f"{found}, expected each once of {', '.join(COLUMNS)}")
         if "section" not in head:
             raise StudyError(f"{path}, line 1", f"found no column 'section', {expected}")
         for cells in lines:
             if any(cell.strip() for cell in cells):
-                place = f"{path}, line {lines.line_num}"
+                places.append(f"{path}, line {lines.line_num}")
                 if len(cells) != len(head):
-                    raise StudyError(
-                        place, f"found {len(cells)} cells, expected {len(head)} as in the first line"
-                    )
-                rows.append(row_of(dict(zip(head, cells, strict=True)), place, "column"))
-                places.append(place)
+                    found = f"found {len(cells)} cells, expected {len(head)} as in the first line"
+                    raise StudyError(places[-1], found)
+                tables.append(dict(zip(head, cells, strict=True)))
     except csv.Error as error:
         raise StudyError(f"{path}, line {lines.line_num}", f"{error}, {expected}") from error
-    return _each_once(rows, places)
+    return of_tables(tables, places)
 
 
-def of_tables(tables: Sequence[Mapping[str, object]]) -> tuple[SectionRow, ...]:
-    """The rows that the tables ``[[imu.section]]`` of a study are; errors name the key, as ``imu.section[2].rate``."""
-    places = [f"imu.section[{number}]" for number in range(1, len(tables) + 1)]
-    return _each_once(
-        [row_of(table, place, "key") for table, place in zip(tables, places, strict=True)], places
+def of_tables(
+    tables: Sequence[Mapping[str, object]], lines: Sequence[str] | None = None
+) -> tuple[SectionRow, ...]:
+    """The rows that the tables ``[[imu.section]]`` of a study are; errors name the key, as ``imu.section[2].rate``.
+
+    ``lines``: places of rows of a file, whose columns are named in errors. Raises `StudyError` for what cannot be
+    understood, and where two sections have one name.
+    """
+    places = (
+        lines if lines is not None else [f"imu.section[{number}]" for number in range(1, len(tables) + 1)]
     )
-
-
-def _each_once(rows: Sequence[SectionRow], places: Sequence[str]) -> tuple[SectionRow, ...]:
-    """The rows; raises `StudyError` where two sections have one name."""
     first: dict[str, str] = {}
-    for row, place in zip(rows, places, strict=True):
+    rows = []
+    for table, place in zip(tables, places, strict=True):
+        row = row_of(table, place, "key" if lines is None else "column")
         if row.section in first:
             found = f"found the section {shown(row.section)} again, which is that of {first[row.section]}"
             raise StudyError(place, f"{found}, expected a name of its own")
         first[row.section] = place
+        rows.append(row)
     return tuple(rows)
 
 
@@ -148,7 +148,7 @@ def row_of(cells: Mapping[str, object], place: str, noun: str) -> SectionRow:
 
 
 def _value(name: str, text: str, where: str) -> object:
-    """What a cell says."""
+    """The value of a cell."""
     if name == "kind":
         kinds = [kind for one in get_args(RowKind) for kind in (get_args(one) or (one,))]
         if text not in kinds:
@@ -163,7 +163,7 @@ def _value(name: str, text: str, where: str) -> object:
         quantity = _quantity(text, dimension, where, f"20 {unit}")
         if name in ("rate", "angle"):
             return quantity
-        return quantity.value + (_ZERO_CELSIUS if name == "temperature" else 0.0)
+        return quantity.value - (_KELVIN.zero if name == "temperature" else 0.0)
     return text
 
 
@@ -253,7 +253,7 @@ def _cell(row: SectionRow, name: str) -> str:
         return value.text
     factor = parse_unit(_DIMENSIONS[name][1]).factor
     return (
-        f"{(value - (_ZERO_CELSIUS if name == 'temperature' else 0.0)) / factor:.12g} {_DIMENSIONS[name][1]}"
+        f"{(value + (_KELVIN.zero if name == 'temperature' else 0.0)) / factor:.12g} {_DIMENSIONS[name][1]}"
     )
 
 

@@ -10,12 +10,10 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import STANDARD_GRAVITY
-from inercal.systems.imu.sections.checks import direction
+from inercal.systems.imu.sections.cutting.checks import direction
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.table import SectionRow
-
-_STEADY = 0.01
-"""Difference of a stated size from that of gravity, as a part of it, up to which it is a direction alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +50,10 @@ def rows_of_means(file: str, means: Means) -> list[SectionRow]:
         row = int(np.flatnonzero(known & (sizes == 0.0))[0]) + 1
         raise StudyError(f"{file}, row {row}", "found a direction of size 0, expected one, or blank cells")
     # 1 for g in either unit: a table of directions is often one of unit vectors, whatever its heading says
-    unit = 1.0 if means.in_si and np.all(np.abs(sizes[known] - 1.0) < _STEADY) else STANDARD_GRAVITY
-    directions = bool(np.all(np.abs(sizes[known] / unit - 1.0) < _STEADY))
+    unit = (
+        1.0 if means.in_si and np.all(np.abs(sizes[known] - 1.0) < LIMITS.known_gravity) else STANDARD_GRAVITY
+    )
+    directions = bool(np.all(np.abs(sizes[known] / unit - 1.0) < LIMITS.known_gravity))
     return [
         _with(row, force[k] / sizes[k] if directions else force[k], directions) if known[k] else row
         for k, row in enumerate(rows)

@@ -14,14 +14,14 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.places import counted_names
-from inercal.systems.imu.sections.limits import LIMITS
+from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.section import Section
 
 _LETTERS = "xyz"
 
 
 def contradictions(sections: Sequence[Section], gyro_scale: float | None) -> tuple[Finding, ...]:
-    """What was read in sections that contradicts what is said of them.
+    """Findings about sections in which something else was read than is said of them.
 
     ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other.
     """
