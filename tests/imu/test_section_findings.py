@@ -10,7 +10,7 @@ from turned_units import DEG, Bench, Unit
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.sections.calibration import calibrate_sections
-from inercal.systems.imu.sections.checks import contradictions
+from inercal.systems.imu.sections.cutting.checks import contradictions
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.priors import Priors
