@@ -59,7 +59,7 @@ class SectionCalibration:
     scatter_dof: dict[str, float]
     """Their degrees of freedom."""
     beyond: dict[str, float]
-    """How far each lies above what was known of it, in standard deviations of its logarithm."""
+    """Distance of each above what was known of it, in standard deviations of its logarithm."""
     noise: dict[str, float]
     """Scatter of the means of each sensor [SI], stated or found."""
     chi2: float
@@ -71,7 +71,7 @@ class SectionCalibration:
     excess: frozenset[str]
     """Sensors whose means scatter beyond their stated noise, for which u allows."""
     freed: bool
-    """Whether the prior of the scale factors was dropped, since the sections deny it."""
+    """True where the prior of the scale factors was dropped, since the sections deny it."""
     residuals: Array
     """Outputs (n, 3 kinds, 3 axes) less those of the model."""
     outlying: Array
@@ -149,7 +149,7 @@ def _freed(scale: Size | None) -> Size | None:
 
 
 def contradicted(found: SectionCalibration) -> bool:
-    """Whether the sections contradict what is said of them: by their sum of squares, or by a scatter that no
+    """True where the sections contradict what is said of them: by their sum of squares, or by a scatter that no
     instrument has."""
     return (
         found.probability < LIMITS.contradiction

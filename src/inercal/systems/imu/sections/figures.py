@@ -21,7 +21,7 @@ def pictures(calibration: CalibrationFromSections) -> list[Picture]:
 
 
 def _left(found: SectionCalibration) -> Picture:
-    """What the fit leaves of each output."""
+    """Residuals of the outputs."""
     readings, panels = found.problem.readings, []
     for name, kind in (("accelerometers", 0), ("gyro", 2)):
         seen = readings.seen[:, kind]

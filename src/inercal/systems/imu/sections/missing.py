@@ -29,30 +29,30 @@ class Missing(NamedTuple):
 
 
 def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...] = ()) -> Missing | None:
-    """What sections leave open of the coefficients that have no prior, at the first guess; None if nothing."""
-    terms, volume = _open(sections, priors, extras)
+    """Coefficients without a prior that sections leave open, at the first guess; None if nothing."""
+    shares = _shares(sections, priors, extras)
+    terms = tuple(name for name, share in shares.items() if not share < 1.0)
     if not terms:
         return None
     if all(name.startswith("D_F") for name in terms):
         return Missing(terms, "")
     told = any(s.kind == "rest" and s.up is not None for s in sections)
     x = first_guess(problem_of(sections, priors, extras)).x
-    best, pose = volume, np.array([0.0, 0.0, 1.0])
+    best, pose = np.inf, np.array([0.0, 0.0, 1.0])
     for way in itertools.product((1.0, 0.0, -1.0), repeat=3):
         if any(way):
             up = np.array(way) / np.linalg.norm(way)
-            output = x[K0] + x[K1] * priors.site.gravity * up
+            output = x[K0] + np.max(x[K1]) * priors.site.gravity * up
             added = Section("rest", acc=output, acc_var=np.full(3, 1e-6), up=up if told else None, up_u=0.01)
-            there = _open([*sections, added], priors, extras)[1]
-            if there < best - 1e-6:
-                best, pose = there, up
+            there = _shares([*sections, added], priors, extras)
+            worst = max(there[name] for name in terms)
+            if worst < (1.0 - 1e-6) * best:
+                best, pose = worst, up
     return Missing(terms, pose_words(pose))
 
 
-def _open(
-    sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]
-) -> tuple[tuple[str, ...], float]:
-    """Names of the coefficients without a prior that stay open, and the logarithm of the volume in which all are."""
+def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> dict[str, float]:
+    """Of each coefficient without a prior its u over that from which it is open, by name."""
     problem = problem_of(sections, priors, extras)
     point = centred(problem, first_guess(problem))
     linear = Linear(problem, point.x, rows(problem, point))
@@ -66,8 +66,7 @@ def _open(
     ]
     size = np.array([LIMITS.open_share * _full_scale(problem, int(linear.shared[k])) for k in flat])
     u = np.sqrt(np.abs(np.diag(covariance)[flat]))
-    names = tuple(COEFFICIENTS[linear.shared[k]] for k in np.array(flat, dtype=int)[~(u < size)])
-    return names, float(np.sum(np.log(np.maximum(u / size, 1e-3)))) if len(flat) else 0.0
+    return {COEFFICIENTS[linear.shared[k]]: float(part) for k, part in zip(flat, u / size, strict=True)}
 
 
 def _full_scale(problem: Problem, p: int) -> float:

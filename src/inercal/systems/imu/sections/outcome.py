@@ -22,6 +22,7 @@ from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.result import Estimate, timed
 from inercal.foundation.units import RAW
+from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
 from inercal.systems.imu.sections.cutting.proposal import Proposal
@@ -70,6 +71,7 @@ def calibrate_from_sections(
     clock = time.perf_counter()
     progress("reading the sections")
     named = _named(records)
+    _refuse_samples(named)
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     proposal = _proposal(named, options)
     sections = tuple(_placed(section, options) for section in proposal.sections)
@@ -127,6 +129,23 @@ def _unit(sensor: str, records: Sequence[Record]) -> Triad | None:
             f"found {sensor} in {' and '.join(sorted(symbols))}, expected one unit in all files",
         )
     return triads[0] if triads else None
+
+
+def _refuse_samples(named: Mapping[str, Record]) -> None:
+    """Refuse rows without times that are samples of a recording: most of many are like the one before."""
+    for name, record in named.items():
+        sensor = "acc" if "acc_x" in record else "gyro"
+        if not is_counted(record) or f"{sensor}_z" not in record:
+            continue
+        values = record.triad(sensor).values
+        size = max(float(np.nanmax(np.ptp(values, axis=0))), float(np.nanmax(np.abs(values))))
+        alike = np.linalg.norm(np.diff(values, axis=0), axis=1) < 10.0 * IMU_LIMITS.same_pose * size
+        if len(values) > IMU_LIMITS.most_poses and np.mean(alike) > 0.5:
+            raise RecordError(
+                name,
+                f"found {len(values)} rows without times, most of them like the one before, expected a time column "
+                "t, or one row for each pose",
+            )
 
 
 def _scale(triad: Triad | None) -> Size | None:
@@ -216,9 +235,20 @@ def _estimate(
             "unused": dict(proposal.unused),
             "by_prior": list(found.by_prior),
             "scatter": dict(found.scatter),
+            "relative_alignment": _relative_alignment(found),
             "unit": symbols,
         },
     )
+
+
+def _relative_alignment(found: SectionCalibration) -> list[Mapping[str, Any]]:
+    """T - M, which says how the axes of the gyro lie to those of the accelerometers, and which navigation needs."""
+    names, values, covariance = found.relative_alignment()
+    u = np.sqrt(np.diag(covariance))
+    return [
+        {"term": name, "value_rad": float(value), "u_rad": float(size)}
+        for name, value, size in zip(names, values, u, strict=True)
+    ]
 
 
 def _item(found: SectionCalibration, source: str, share: Mapping[str, float]) -> BudgetItem:

@@ -1,4 +1,4 @@
-"""What is known before the data: means and standard deviations of all that the sections share."""
+"""Priors: means and standard deviations of all that the sections share."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Size(NamedTuple):
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known before the data. Standard deviations: 0 is exact, inf is nothing."""
+    """Means and standard deviations of what is known before the data. 0 is exact, inf is nothing."""
 
     site: Site
     """Gravity and latitude with their u."""

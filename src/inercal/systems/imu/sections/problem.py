@@ -41,7 +41,7 @@ from inercal.systems.imu.sections.unknowns import (
 )
 
 ANY_EARTH: Final = EARTH_RATE / np.sqrt(3.0)
-"""Standard deviation of a component of earth rate in a direction that is not priors."""
+"""Standard deviation of a component of earth rate in a direction that is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Extra(Protocol):
     """Sources in budgets of its own shared unknowns (e,), which stand last among the shared ones."""
     mean: Array
     sd: Array
-    """What is known of these beforehand (e,)."""
+    """Means and standard deviations of these beforehand (e,)."""
     sizes: dict[str, Size]
     """Components of variance that it brings."""
     runs: Places
@@ -229,7 +229,7 @@ def with_classes(problem: Problem, scatter: dict[str, float]) -> Problem:
 
 
 def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) -> _Shared:
-    """What is known of the shared unknowns."""
+    """Means and standard deviations of the shared unknowns."""
     groups, sessions = len(readings.rate_groups), len(readings.sessions)
     mean, sd = np.zeros(COMMON + groups + 6 * sessions), np.full(COMMON + groups + 6 * sessions, np.inf)
     sd[M] = sd[T] = priors.misalignment

@@ -14,7 +14,7 @@ Kind = Literal["rest", "rate", "turn"]
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """What was read in a section, and what is known of it.
+    """Readings of a section, and what is known of it.
 
     A section is a stretch of a recording, a file, or a row of means. SI: angles in rad, rates in rad/s, times in s;
     outputs in the unit of the instrument. Directions are unit vectors on the axes of the case.
@@ -27,29 +27,29 @@ class Section:
     where: str = ""
     """Its file and times, in words; empty for a row of means."""
     why: str = ""
-    """Where what is known comes from: name, label, row, or how it was detected."""
+    """Source of what is known: name, label, row, or how it was detected."""
     acc: Array | None = None
     """Mean outputs (3,) of the accelerometers, NaN for a channel that is not there; of a turn those before it."""
     acc_var: Array | None = None
-    """Variances (3,) of ``acc`` by noise; None: not priors."""
+    """Variances (3,) of ``acc`` by noise; None: not known."""
     acc_after: Array | None = None
     """Mean outputs (3,) after a turn."""
     gyro: Array | None = None
     """Mean outputs (3,) of the gyros, of a turn over the motion alone."""
     gyro_var: Array | None = None
-    """Variances (3,) of ``gyro`` by noise; None: not priors."""
+    """Variances (3,) of ``gyro`` by noise; None: not known."""
     up: Array | None = None
-    """Direction (3,) of specific force (up at rest); None: not priors."""
+    """Direction (3,) of specific force (up at rest); None: not known."""
     up_u: float | None = None
     """Standard uncertainty of ``up`` in either direction across [rad]; None: not stated."""
     force: Array | None = None
     """Specific force (3,) itself, where another instrument measured it [m/s^2]; ``up`` is then not used."""
     axis: Array | None = None
-    """Axis (3,) of the rotation, by the right-hand rule; None: not priors."""
+    """Axis (3,) of the rotation, by the right-hand rule; None: not known."""
     axis_u: float | None = None
     """Standard uncertainty of ``axis`` in either direction across [rad]; None: not stated."""
     level_u: float | None = None
-    """The axis is vertical within so much [rad]; ``up`` then only tells which end is up. None: not priors."""
+    """The axis is vertical within so much [rad]; ``up`` then only tells which end is up. None: not known."""
     rate: float = 0.0
     """Rate of a ``rate`` section about ``axis`` [rad/s]."""
     rate_u: float = 0.0
@@ -67,7 +67,7 @@ class Section:
     setup: str = ""
     """Sections of one setup share one placing: not touched between them."""
     north: Array | None = None
-    """Direction (3,) of north on the axes of the case at the beginning; None: the heading is not priors."""
+    """Direction (3,) of north on the axes of the case at the beginning; None: the heading is not known."""
     north_u: float = 0.0
     """Standard uncertainty of the heading [rad]."""
     session: str = ""
@@ -75,4 +75,4 @@ class Section:
     scatter: str = ""
     """Sections of one group share one variance of means that nobody states."""
     temperature: float | None = None
-    """Temperature [K], where it is priors."""
+    """Temperature [K], where it is known."""

@@ -10,7 +10,7 @@ from inercal.systems.imu.sections.unknowns import D_F, K0, K1, S, across
 
 
 def first_guess(problem: Problem) -> Iterate:
-    """Coefficients and the directions that are not priors. A gain that outputs and directions do not tell is typical of
+    """Coefficients and the directions that are not known. A gain that outputs and directions do not tell is typical of
     the instrument; the sign of a gain is that of the known directions."""
     r, priors = problem.readings, problem.priors
     n, x = len(r.sections), problem.mean.copy()
@@ -43,7 +43,10 @@ def first_guess(problem: Problem) -> Iterate:
             rest = still[used] if kind == 2 else np.zeros(len(used), dtype=bool)
             x[bias] = y[rest].mean(axis=0) if rest.any() else 0.5 * (y.min(axis=0) + y.max(axis=0))
             moving = kind == 0 or not rest.all()
-            x[gain] = np.maximum(0.5 * np.ptp(y, axis=0), 0.3 * span) / full if moving else typical / full
+            by_range = np.maximum(0.5 * np.ptp(y, axis=0), 0.3 * span)
+            # poses need not reach both ends of an axis: a gain that the unit tells is better known
+            near = scale is not None and np.all(by_range < 1.5 * abs(typical))
+            x[gain] = (by_range if moving and not near else typical) / full
         x[gain], x[bias] = np.where(there, x[gain], 1.0), np.where(there, x[bias], 0.0)
         way = (y - x[bias]) / x[gain] * np.where(size[used] < 0.0, -1.0, 1.0)[:, None]
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)

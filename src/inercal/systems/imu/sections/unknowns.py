@@ -38,7 +38,7 @@ D_F, S, T, G = slice(15, 18), slice(18, 21), slice(21, 27), slice(27, 36)
 """G is carried as a rate, (rad/s)/(m/s^2): what outputs see of it is S times as large."""
 
 GRAVITY, CLOCK, EARTH_UP, EARTH_ALONG = 36, 37, 38, 39
-"""Gravity; the relative error of the clock; the upward part of earth rate; its part along axes that are not priors."""
+"""Gravity; the relative error of the clock; the upward part of earth rate; its part along axes that are not known."""
 
 MOUNTING: Final = slice(40, 43)
 """Rotation of all directions and axes from where they are said to be."""
