@@ -232,6 +232,8 @@ _OVER_TEMPERATURE = {
     "T1": (", per kelvin", "/K"),
     "T2": (", per kelvin squared", "/K^2"),
     "T3": (", per kelvin cubed", "/K^3"),
+    "T4": (", by the fourth power of kelvins", "/K^4"),
+    "T5": (", by the fifth power of kelvins", "/K^5"),
     "hyst": (", rising less falling temperature", ""),
 }
 
