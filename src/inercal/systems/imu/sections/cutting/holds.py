@@ -72,7 +72,7 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
             for level in windows.levels(cap)
             for gate in sorted({*(max(gate, harmless) for gate in gates), np.inf})
         ]
-        held = max(sets, key=lambda one: _worth(one[0], *windows.poses(one[1])))[1]
+        held = _best([(gate, stretches, *windows.poses(stretches)) for gate, stretches in sets])
     if turning is not None and unrest is not None:
         rests = [turning.stretches(unrest[0] + unrest[1] < gate, shortest) for gate in gates or [np.inf]]
         resting = max(rests, key=len)
@@ -235,9 +235,19 @@ class _Windows:
         return int(sound.any()) + int(moved.sum()), int((stops - starts)[sound].sum())
 
 
-def _worth(gate: float, poses: int, blocks: int) -> tuple[int, float, int]:
-    """Order among sets of holds: most poses first, then the least turning that gives them, then the most time."""
-    return poses, -gate, blocks
+def _best(sets: Sequence[tuple[float, list[Dwell], int, int]]) -> list[Dwell]:
+    """The best of sets of holds, from the calmest on, each with its gate, its poses and its blocks.
+
+    Most poses first; then the least turning that gives them; then the calmest that keeps most of the time, for slow
+    motions add time as well.
+    """
+    most = max(poses for _, _, poses, _ in sets)
+    gate = min(gate for gate, _, poses, _ in sets if poses == most)
+    left = [
+        (blocks, stretches) for turning, stretches, poses, blocks in sets if (turning, poses) == (gate, most)
+    ]
+    longest = max(blocks for blocks, _ in left)
+    return next(stretches for blocks, stretches in left if blocks >= LIMITS.kept_time * longest)
 
 
 def _sums_of_windows(values: Array) -> Array:
@@ -269,7 +279,9 @@ def _valleys(sizes: Array) -> list[float]:
             top, low = height, height
         if height > top:
             top, low = height, height
-    return [float(10.0 ** (0.5 * (edges[a] + edges[b] + width))) for a, b in found]
+    # in a wide valley not far from rest: a slow motion begins in it
+    reach = round(LIMITS.valley_reach / width)
+    return [float(10.0 ** (0.5 * (edges[a] + edges[min(b, a + 2 * reach)] + width))) for a, b in found]
 
 
 def _harmless(windows: _Windows, turning: Array, time: float) -> float:
