@@ -300,7 +300,7 @@ CEILINGS = {
     "names used across folders": 1445,
     "class names shared": 5,
     "constants outside Limits": 440,
-    "modules": 641,
+    "modules": 642,
 }
 
 

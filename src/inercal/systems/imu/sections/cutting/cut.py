@@ -52,11 +52,15 @@ class TriadSamples:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stretch of a recording and the row that says what is known of it; None: the triad is not there."""
+    """A stretch of a recording and the row that says what is known of it; None: the triad is not there.
+
+    ``force`` is specific force [m/s^2] as another instrument measured it.
+    """
 
     row: SectionRow
     acc: TriadSamples | None
     gyro: TriadSamples | None
+    force: TriadSamples | None = None
 
 
 @dataclass(frozen=True)
@@ -206,6 +210,8 @@ def _steady(stretch: Stretch) -> _Read | str:
         return f"the {clipped[0]} is at the end of its range" if clipped else "no samples lie in it"
     longest = max(whole.values(), key=lambda one: len(one.t))
     means = {sensor: one.values.mean(axis=0) for sensor, one in whole.items()}
+    if stretch.force is not None and len(stretch.force.t):
+        means["force"] = stretch.force.values.mean(axis=0)
     known = dataclasses.replace(
         _known(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
     )
