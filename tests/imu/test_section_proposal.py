@@ -203,6 +203,8 @@ def test_the_labels_of_a_shipped_recording():
     assert sorted(side_of(row.up) for row in rests) == ["+x", "+y", "+z", "-x", "-y", "-z"]
     assert [row.section for row in found.rows if row.kind == "turn"] == ["x_rot", "y_rot", "z_rot"]
     assert len(found.sections) == 6
+    (question,) = found.questions
+    assert question.headline == "The angle of 3 turns of ferraris.csv is not known."
 
 
 def test_rows_of_means_with_true_directions():

@@ -11,7 +11,7 @@ import numpy as np
 from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.checks.values import at_ends
-from inercal.foundation.records.places import counted
+from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import RAW
 from inercal.systems.imu.rows import is_counted
@@ -135,16 +135,16 @@ def _rows(file: RecordedTriads) -> tuple[list[SectionRow], list[Finding]]:
     if file.record.labels and len(file.record.labels) == len(clock.t):
         rows = _labelled(file, clock)
         if rows:
-            return rows, []
+            return rows, _asked(file.name, rows)
     said = claim(file.name)
     if not said.kind:
         return rows_of_log(file.name, file.acc, file.gyro, _scale(file.record))
     name = PurePosixPath(file.name.replace("\\", "/")).stem
     row = _of_claim(said, name, file.name, "name")
-    asked = [] if row.kind != "turn" or row.angle is not None else [_which_angle(row)]
     if row.kind == "rest":
         return _held(file, clock, row)
-    return [_at_its_rate(file, row) if row.kind == "rate" else row], asked
+    rows = [_at_its_rate(file, row) if row.kind == "rate" else row]
+    return rows, _asked(file.name, rows)
 
 
 def _at_its_rate(file: RecordedTriads, row: SectionRow) -> SectionRow:
@@ -198,14 +198,14 @@ def _of_claim(said: Claim, name: str, file: str, why: str) -> SectionRow:
     )  # fmt: skip
 
 
-def _which_angle(row: SectionRow) -> Finding:
-    """The question after the angle of a turn."""
-    return Finding(
-        "not_stated",
-        f"{row.section} is a turn of an angle that nobody stated.",
-        row.file,
-        action="Write it into the column `angle` of sections.csv, with its sign.",
-    )
+def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:
+    """The question after the angles of turns that names or labels leave open."""
+    turns = [row for row in rows if row.kind == "turn" and row.angle is None]
+    if not turns:
+        return []
+    headline = f"The angle of {counted(len(turns), 'turn')} of {file} is not known."
+    action = "Write it into the column `angle` of sections.csv, with its sign."
+    return [Finding("not_stated", headline, counted_names([row.section for row in turns]), action=action)]
 
 
 def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
