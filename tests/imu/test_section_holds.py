@@ -134,8 +134,29 @@ def test_missing_rows_and_gaps_end_a_hold():
         assert len(found) == 21
 
 
+def test_slow_motions_are_no_part_of_a_hold():
+    """A fine unit on a table that takes 15 s for a turn: 2 s after its beginning it has turned by 1 deg."""
+    how = Handling(
+        12, rest=(20.0, 30.0), move=(15.0, 20.0), tremor=0.0, tremor_rate=0.0, noise=5e-4, gyro_noise=1e-5
+    )
+    for seed in (32, 33):
+        t, acc, gyro, truth = held(seed, how)
+        found = spans(t, holds_of(t, acc, gyro).acc)
+        assert len(found) == len(truth)
+        assert np.max(np.abs(np.array(found) - np.array(truth))) < 0.2
+
+
+def test_vibration_and_tremor_hide_no_hold():
+    for how in (
+        Handling(rest=(1.5, 3.0), noise=0.3, gyro_noise=0.02),
+        Handling(rest=(1.5, 3.0), tremor=0.12),
+    ):
+        t, acc, gyro, truth = held(34, how)
+        assert len(holds_of(t, acc, gyro).acc) == len(truth)
+
+
 def test_a_hold_that_drifts_is_named():
-    t, acc, gyro, truth = held(11, TABLE)
+    t, acc, gyro, truth = held(11, Handling(20, rest=(5.0, 6.0)))
     begin, end = truth[4]
     inside = (t >= begin) & (t <= end)
     acc[inside, 0] += np.linspace(0.0, 0.6, np.count_nonzero(inside))

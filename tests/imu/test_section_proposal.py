@@ -1,14 +1,18 @@
 """What recordings by their names say of sections: files of sides, one log, labels, rows of means."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from held_recordings import GRAVITY, Handling, held
 from recordings import record_of, shipped
 
 from inercal.foundation.errors import RecordError, StudyError
+from inercal.foundation.units import parse_unit
+from inercal.systems.imu.sections.cutting.cut import cut
 from inercal.systems.imu.sections.cutting.means import Means, rows_of_means, sections_of_means
-from inercal.systems.imu.sections.cutting.proposal import Proposal
-from inercal.systems.imu.sections.cutting.table import read_table, side_of, write_table
+from inercal.systems.imu.sections.cutting.proposal import Proposal, RecordedTriads, stretches_of
+from inercal.systems.imu.sections.cutting.table import SectionRow, read_table, side_of, write_table
 
 K0, K1, D_F = np.array([570.0, -20.0, 640.0]), 1672.0, np.array([-560.0, 110.0, -73.0])
 SIDES = {
@@ -199,6 +203,8 @@ def test_the_labels_of_a_shipped_recording():
     assert sorted(side_of(row.up) for row in rests) == ["+x", "+y", "+z", "-x", "-y", "-z"]
     assert [row.section for row in found.rows if row.kind == "turn"] == ["x_rot", "y_rot", "z_rot"]
     assert len(found.sections) == 6
+    (question,) = found.questions
+    assert question.headline == "The angle of 3 turns of ferraris.csv is not known."
 
 
 def test_rows_of_means_with_true_directions():
@@ -237,6 +243,28 @@ def test_rows_of_two_tables_are_told_apart():
     found = Proposal.of(tables)
     assert len({row.section for row in found.rows}) == 12
     assert {one.name for one in found.sections} == {row.section for row in found.rows}
+
+
+def test_a_reference_beside_the_unit_gives_the_force():
+    """A row that names three channels: their mean over its stretch, in m/s²."""
+    t = np.arange(1000) / 100.0
+    rng = np.random.default_rng(17)
+    true = np.stack([0.0 * t, np.where(t < 5.0, 0.5, -0.5), 1.0 + 0.0 * t], axis=1)
+    record = record_of(t, GRAVITY * true + 0.01 * rng.normal(size=true.shape), acc_unit="m/s^2")
+    column = record["acc_x"]
+    beside = {
+        f"a{k}": replace(column, name=f"a{k}", unit=parse_unit("g"), values=true[:, k - 1].copy())
+        for k in (1, 2, 3)
+    }
+    both = RecordedTriads.of("log.csv", replace(record, columns={**record.columns, **beside}))
+    row = SectionRow("shaken", "log.csv", 0.0, 4.9, force=("a1", "a2", "a3"))
+    (section,) = cut(stretches_of([row], {"log.csv": both})).sections
+    np.testing.assert_allclose(section.force, [0.0, 0.5 * 9.80665, 9.80665])
+    with pytest.raises(RecordError, match="no column a4"):
+        both.stretch(replace(row, force=("a1", "a2", "a4")))
+    counts = RecordedTriads.of("log.csv", record_of(t, true))
+    with pytest.raises(RecordError, match="expected three accelerations of one clock"):
+        counts.stretch(replace(row, force=("acc_x", "acc_y", "acc_z")))
 
 
 def test_bad_input_is_one_sentence():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +30,18 @@ class TriadSamples:
 
     def between(self, begin: float | None, end: float | None) -> TriadSamples:
         """Those that are whole, from ``begin`` to ``end`` [s]; None: from the first, to the last."""
-        kept = np.isfinite(self.t) & np.isfinite(self.values).all(axis=1)
-        kept &= (self.t >= (-np.inf if begin is None else begin)) & (
-            self.t <= (np.inf if end is None else end)
-        )
-        return TriadSamples(self.t[kept], self.values[kept], self.clipped[kept])
+        low, high = -np.inf if begin is None else begin, np.inf if end is None else end
+        near = slice(None)
+        if self._ordered:
+            near = slice(np.searchsorted(self.t, low), np.searchsorted(self.t, high, side="right"))
+        t, values, clipped = self.t[near], self.values[near], self.clipped[near]
+        kept = np.isfinite(t) & np.isfinite(values).all(axis=1) & (t >= low) & (t <= high)
+        return TriadSamples(t[kept], values[kept], clipped[kept])
+
+    @cached_property
+    def _ordered(self) -> bool:
+        """True where all times are known and none runs backward."""
+        return bool((np.diff(self.t) >= 0.0).all())
 
     @property
     def step(self) -> float:
@@ -44,11 +52,15 @@ class TriadSamples:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stretch of a recording and the row that says what is known of it; None: the triad is not there."""
+    """A stretch of a recording and the row that says what is known of it; None: the triad is not there.
+
+    ``force`` is specific force [m/s^2] as another instrument measured it.
+    """
 
     row: SectionRow
     acc: TriadSamples | None
     gyro: TriadSamples | None
+    force: TriadSamples | None = None
 
 
 @dataclass(frozen=True)
@@ -198,6 +210,8 @@ def _steady(stretch: Stretch) -> _Read | str:
         return f"the {clipped[0]} is at the end of its range" if clipped else "no samples lie in it"
     longest = max(whole.values(), key=lambda one: len(one.t))
     means = {sensor: one.values.mean(axis=0) for sensor, one in whole.items()}
+    if stretch.force is not None and len(stretch.force.t):
+        means["force"] = stretch.force.values.mean(axis=0)
     known = dataclasses.replace(
         _known(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
     )

@@ -12,14 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.records.dwells import Dwell, breaks, static_intervals
+from inercal.foundation.records.dwells import Dwell, breaks
 from inercal.systems.imu.sections.cutting.limits import LIMITS
-
-Bools = NDArray[np.bool_]
-Places = NDArray[np.int64]
+from inercal.systems.imu.sections.cutting.windows import Places, Windows, valleys
 
 
 @dataclass(frozen=True)
@@ -56,14 +53,14 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
         return Holds((), (), ())
     cuts, step = _cuts(t), _step(t)
     shortest = max(LIMITS.blocks_of_window, int(LIMITS.shortest_hold / (block * step)) - 1)
-    turning = None if gyro is None else _Windows.of(gyro, block, cuts)
+    turning = None if gyro is None else Windows.of(gyro, block, cuts)
     unrest = None if turning is None else turning.unrest()
-    gates = [] if unrest is None else _valleys(unrest[0] + unrest[1])
+    gates = [] if unrest is None else valleys(unrest[0] + unrest[1])
     harmless = 0.0
     held: list[Dwell] = []
     resting: list[Dwell] = []
     if acc is not None:
-        windows = _Windows.of(acc, block, cuts)
+        windows = Windows.of(acc, block, cuts)
         slow = np.zeros(len(windows.variance)) if unrest is None else unrest[1]
         cap = (LIMITS.restless_hold * windows.gravity) ** 2
         harmless = _harmless(windows, slow, block * step)
@@ -72,7 +69,7 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
             for level in windows.levels(cap)
             for gate in sorted({*(max(gate, harmless) for gate in gates), np.inf})
         ]
-        held = max(sets, key=lambda one: _worth(one[0], *windows.poses(one[1])))[1]
+        held = _best([(gate, stretches, *windows.poses(stretches)) for gate, stretches in sets])
     if turning is not None and unrest is not None:
         rests = [turning.stretches(unrest[0] + unrest[1] < gate, shortest) for gate in gates or [np.inf]]
         resting = max(rests, key=len)
@@ -102,9 +99,9 @@ def steady_rates(t: Array, gyro: Array) -> tuple[Dwell, ...]:
     if len(t) < (LIMITS.blocks_of_window + 1) * block:
         return ()
     cuts = _cuts(t)
-    windows = _Windows.of(gyro, block, cuts)
+    windows = Windows.of(gyro, block, cuts)
     variance, turning = windows.unrest()
-    calm, moving = _valleys(variance), _valleys(variance + turning)
+    calm, moving = valleys(variance), valleys(variance + turning)
     if not moving:
         return ()
     still = (variance < (calm or moving)[0]) & (turning > moving[0])
@@ -138,141 +135,22 @@ def _cuts(t: Array) -> Places:
     return breaks(t, 0.5 * LIMITS.still_window + 3.0 * _step(t))
 
 
-@dataclass(frozen=True, eq=False)
-class _Windows:
-    """Windows of a triad: variances (m,) summed over axes, infinite where a row is missing or time breaks.
+def _best(sets: Sequence[tuple[float, list[Dwell], int, int]]) -> list[Dwell]:
+    """The best of sets of holds, from the calmest on, each with its gate, its poses and its blocks.
 
-    Means (m, 3) of windows and (m + 3, 3) of ``blocks`` are less the mean ``middle`` (3,) of the recording; ``breaks``
-    are blocks before which time breaks.
+    Most poses first; then the least turning that gives them; then the calmest that keeps most of the time, for slow
+    motions add time as well.
     """
-
-    variance: Array
-    means: Array
-    blocks: Array
-    middle: Array
-    breaks: Places
-
-    @staticmethod
-    def of(x: Array, block: int, cuts: Places) -> _Windows:
-        """The windows of outputs (n, 3), in blocks of so many rows."""
-        count = len(x) // block
-        finite = x[np.isfinite(x).all(axis=1)]
-        middle = np.asarray(finite.mean(axis=0) if len(finite) else np.zeros(x.shape[1]))
-        rows = (x[: count * block] - middle).reshape(count, block, -1)
-        sums, squares = rows.sum(axis=1), np.einsum("ijk,ijk->i", rows, rows)
-        total, power = (_sums_of_windows(values) for values in (sums, squares))
-        size = LIMITS.blocks_of_window * block
-        variance = np.maximum(power - (total**2).sum(axis=1) / size, 0.0) / (size - 1)
-        begins = np.arange(len(variance)) * block
-        inside = np.searchsorted(cuts, begins + size) > np.searchsorted(cuts, begins, side="right")
-        variance[inside | ~np.isfinite(variance)] = np.inf
-        return _Windows(variance, total / size, sums / block, middle, cuts[cuts % block == 0] // block)
-
-    @property
-    def gravity(self) -> float:
-        """Size of gravity [output]: half the largest range of an axis, or the mean output where it hardly turns."""
-        known = np.isfinite(self.variance)
-        if not known.any():
-            return 0.0
-        calm = self.means[self.variance <= np.median(self.variance[known])]
-        half, whole = (
-            0.5 * float(np.max(np.ptp(calm, axis=0))),
-            float(np.linalg.norm(self.middle + calm.mean(axis=0))),
-        )
-        return half if half > LIMITS.drift_in_hold * whole else whole
-
-    def levels(self, cap: float) -> list[float]:
-        """Variances below which windows may be still: the valleys below ``cap``; of one hump that all are, or none."""
-        valleys = [level for level in _valleys(self.variance) if level < cap]
-        return valleys or [cap if np.mean(self.variance < cap) > 0.5 else 0.0]
-
-    def unrest(self) -> tuple[Array, Array]:
-        """Variances (m,) of a gyro's windows, and squares (m,) of their means' distance from that at rest."""
-        return self.variance, ((self.means - self.at_rest()) ** 2).sum(axis=1)
-
-    def at_rest(self) -> Array:
-        """Mean output (3,) at rest: of the calm windows, that to which the instrument comes back most often."""
-        known = self.variance[np.isfinite(self.variance)]
-        if not len(known):
-            return np.zeros(self.means.shape[1])
-        valleys = _valleys(self.variance)
-        calm = np.flatnonzero(self.variance <= (valleys[0] if valleys else np.median(known)))
-        calm = calm[:: max(len(calm) // 600, 1)]
-        means = self.means[calm]
-        reach = 9.0 * float(np.median(self.variance[calm])) / len(self.means[0])
-        near = ((means[:, None] - means[None]) ** 2).sum(axis=2) <= max(reach, np.finfo(float).tiny)
-        visits = (near & ~np.roll(near, 1, axis=1)).sum(axis=1)
-        best = int(np.lexsort((near.sum(axis=1), np.minimum(visits, 1000)))[-1])
-        return np.asarray(means[near[best]].mean(axis=0))
-
-    def stretches(self, still: Bools, shortest: int) -> list[Dwell]:
-        """Runs of blocks, at least so many, that lie in windows which are still (m,)."""
-        inside = np.zeros(len(self.blocks), dtype=bool)
-        for k in range(LIMITS.blocks_of_window):
-            inside[k : k + len(still)] |= still
-        return list(static_intervals(inside, self.breaks, shortest))
-
-    def poses(self, stretches: Sequence[Dwell]) -> tuple[int, int]:
-        """Poses in stretches of blocks that do not drift, and the number of blocks in them."""
-        if not stretches:
-            return 0, 0
-        sums = np.concatenate(
-            [np.zeros((1, self.blocks.shape[1])), np.cumsum(np.nan_to_num(self.blocks), axis=0)]
-        )
-        starts, stops = (np.array([getattr(one, end) for one in stretches]) for end in ("start", "stop"))
-        third = np.maximum((stops - starts) // 3, 1)
-        first, last = (
-            (sums[starts + third] - sums[starts]) / third[:, None],
-            (sums[stops] - sums[stops - third]) / third[:, None],
-        )
-        steps = np.nan_to_num(np.sum(np.diff(self.blocks, axis=0) ** 2, axis=1))
-        power = np.concatenate([[0.0], np.cumsum(steps)])
-        noise = (power[stops - 1] - power[starts]) / (stops - starts - 1) / third
-        limit = np.maximum((LIMITS.drift_in_hold * self.gravity) ** 2, LIMITS.drift_sigmas**2 * noise)
-        sound = ((last - first) ** 2).sum(axis=1) <= limit
-        means = ((sums[stops] - sums[starts]) / (stops - starts)[:, None])[sound]
-        moved = np.linalg.norm(np.diff(means, axis=0), axis=1) > LIMITS.same_pose * self.gravity
-        return int(sound.any()) + int(moved.sum()), int((stops - starts)[sound].sum())
+    most = max(poses for _, _, poses, _ in sets)
+    gate = min(gate for gate, _, poses, _ in sets if poses == most)
+    left = [
+        (blocks, stretches) for turning, stretches, poses, blocks in sets if (turning, poses) == (gate, most)
+    ]
+    longest = max(blocks for blocks, _ in left)
+    return next(stretches for blocks, stretches in left if blocks >= LIMITS.kept_time * longest)
 
 
-def _worth(gate: float, poses: int, blocks: int) -> tuple[int, float, int]:
-    """Order among sets of holds: most poses first, then the least turning that gives them, then the most time."""
-    return poses, -gate, blocks
-
-
-def _sums_of_windows(values: Array) -> Array:
-    """Sums over each window of its blocks' values (k, ...)."""
-    stop = len(values) - LIMITS.blocks_of_window + 1
-    return np.asarray(sum(values[k : stop + k] for k in range(LIMITS.blocks_of_window)))
-
-
-def _valleys(sizes: Array) -> list[float]:
-    """Sizes at the valleys between humps of the logarithm of ``sizes`` (m,), ascending."""
-    known = np.log10(sizes[np.isfinite(sizes) & (sizes > 0.0)])
-    if len(known) < 2 * LIMITS.hump_windows:
-        return []
-    width = 0.05
-    counts, edges = np.histogram(known, bins=np.arange(known.min() - 1.0, known.max() + 1.0, width))
-    places = np.arange(-8, 9)
-    kernel = np.exp(-0.5 * (places / 3.0) ** 2)
-    smooth = np.convolve(counts, kernel / kernel.max(), mode="same")
-    found: list[tuple[int, int]] = []  # ends of the valleys: where the smoothed counts are lowest
-    top, low, begin, end = 0.0, np.inf, 0, 0
-    for k, height in enumerate(smooth):
-        if height < low - 1e-9:
-            low, begin, end = height, k, k
-        elif height <= low + 1e-9:
-            end = k
-        hump = min(top, height)
-        if hump >= LIMITS.hump_windows and low <= LIMITS.valley_depth * hump:
-            found.append((begin, end))
-            top, low = height, height
-        if height > top:
-            top, low = height, height
-    return [float(10.0 ** (0.5 * (edges[a] + edges[b] + width))) for a, b in found]
-
-
-def _harmless(windows: _Windows, turning: Array, time: float) -> float:
+def _harmless(windows: Windows, turning: Array, time: float) -> float:
     """Square [output^2] of a rate that does no harm to the mean of accelerometers, in the gyro's output.
 
     The scale of a gyro in counts is told by how fast the vertical turns where the gyro does: ``turning`` (m,) are

@@ -22,10 +22,16 @@ class Limits:
     valley_depth: float = 0.6
     """Height of a valley between two humps of the variances, over that of the lower hump, up to which it is one."""
 
+    valley_reach: float = 0.5
+    """Distance [powers of ten of variance] from the hump of rest at which the threshold lies at most."""
+
+    kept_time: float = 0.7
+    """Part of the time at rest that the calmer of two sets of holds with the same poses keeps at least."""
+
     hump_windows: float = 4.0
     """Windows that the peak of a hump holds at least, within half a power of ten of variance."""
 
-    restless_hold: float = 0.05
+    restless_hold: float = 0.1
     """Standard deviation of specific force in a window, as a part of gravity, from which nothing is held still."""
 
     drift_in_hold: float = 0.02

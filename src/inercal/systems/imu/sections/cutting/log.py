@@ -75,30 +75,31 @@ def on_clock(samples: TriadSamples, t: Array) -> Array:
 
 
 def with_sides(rests: Sequence[SectionRow], means: Array) -> list[SectionRow]:
-    """Rests with the side that each stands on, where *all* of their means (n, 3) are near sides; else as they are.
+    """Rests with the side that each stands on, where *all* of their means (n, 3) are near sides; else in words alone.
 
     Bias and size of outputs are those that fit sides best: by the median over the rests, for most have an axis level,
     or by the middle of the range, where both sides of each axis are there.
     """
     if len(rests) < LIMITS.sides_to_compare:
         return list(rests)
-    best, worst = None, np.cos(LIMITS.side)
-    for middle in (np.median(means, axis=0), 0.5 * (means.min(axis=0) + means.max(axis=0))):
+    ways, worst, sided = None, -1.0, False
+    for middle in (0.5 * (means.min(axis=0) + means.max(axis=0)), np.median(means, axis=0)):
         off = means - middle
         sizes = np.linalg.norm(off, axis=1)
         if np.min(sizes) < 0.5 * np.median(sizes):
             continue
-        cosines = np.max(np.abs(off), axis=1) / sizes
-        if np.min(cosines) > worst:
-            best, worst = off / sizes[:, None], float(np.min(cosines))
-    if best is None:
+        nearest = float(np.min(np.max(np.abs(off), axis=1) / sizes))
+        if nearest > worst:
+            ways, worst, sided = off / sizes[:, None], nearest, nearest > np.cos(LIMITS.side)
+    if ways is None:
         return list(rests)
-    sided = []
-    for rest, way in zip(rests, best, strict=True):
-        up = np.eye(3)[int(np.argmax(np.abs(way)))] * np.sign(way[int(np.argmax(np.abs(way)))])
-        angle = np.degrees(np.arccos(min(float(way @ up), 1.0)))
-        sided.append(replace(rest, up=up, why=f"detected, {angle:.0f} deg off {direction(way)}"))
-    return sided
+    told = []
+    for rest, way in zip(rests, ways, strict=True):
+        k = int(np.argmax(np.abs(way)))
+        angle = np.degrees(np.arccos(min(float(abs(way[k])), 1.0)))
+        why = f"detected, {angle:.0f} deg off {direction(way)}"
+        told.append(replace(rest, up=np.eye(3)[k] * np.sign(way[k]) if sided else None, why=why))
+    return told
 
 
 def _unused(file: str, t: Array, unused: Sequence[UnusedHold]) -> Finding:

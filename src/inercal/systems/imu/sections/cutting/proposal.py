@@ -11,6 +11,7 @@ import numpy as np
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.checks.values import at_ends
+from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import RAW
 from inercal.systems.imu.rows import is_counted
@@ -47,7 +48,7 @@ class Proposal:
             A recording has neither accelerometers nor gyros.
         """
         means = means or {}
-        files = [_recorded(name, record) for name, record in records.items()]
+        files = [RecordedTriads.of(name, record) for name, record in records.items()]
         tables = {
             file.name: Means(_values(file.acc), _values(file.gyro))
             for file in files
@@ -66,7 +67,7 @@ class Proposal:
         sections: list[Section] = []
         for name, table in tables.items():
             sections += sections_of_means([row for row in rows if row.file == name], table)
-        recorded = {file.name: (file.acc, file.gyro) for file in files if file.name not in tables}
+        recorded = {file.name: file for file in files if file.name not in tables}
         done = cut(stretches_of(rows, recorded))
         sections += done.sections
         scales = {_scale(file.record) for file in files if file.gyro is not None}
@@ -116,53 +117,76 @@ class Proposal:
 
 
 @dataclass(frozen=True, eq=False)
-class _Recorded:
-    """A recording by name, with its triads."""
+class RecordedTriads:
+    """A recording by name, with its triads; None: not there, or not whole."""
 
     name: str
     record: Record
     acc: TriadSamples | None
     gyro: TriadSamples | None
 
+    @staticmethod
+    def of(name: str, record: Record) -> RecordedTriads:
+        """The triads of a record; raises `RecordError` where it has none."""
+        acc, gyro = _samples(record, "acc"), _samples(record, "gyro")
+        if acc is None and gyro is None:
+            raise RecordError(
+                name, "found neither three accelerometers nor three gyros, expected one of the two"
+            )
+        return RecordedTriads(name, record, acc, gyro)
 
-def stretches_of(
-    rows: Sequence[SectionRow], files: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]]
-) -> list[Stretch]:
-    """The stretches that rows are of, in recordings given as accelerometers and gyros by name.
+    def stretch(self, row: SectionRow) -> Stretch:
+        """The stretch that a row is of; raises `RecordError` for a channel of force that is not there."""
+        acc, gyro, force = (
+            None if one is None else one.between(row.begin, row.end)
+            for one in (self.acc, self.gyro, self._force(row))
+        )
+        return Stretch(row, acc, gyro, force)
+
+    def _force(self, row: SectionRow) -> TriadSamples | None:
+        """Specific force (n, 3) [m/s^2] of the channels that a row names."""
+        if not isinstance(row.force, tuple):
+            return None
+        columns = [self.record[name] for name in row.force]
+        for column in columns:
+            if column.unit.dimension != "acceleration" or len(column.t) != len(columns[0].t):
+                found = f"{column.name} in {column.unit.symbol}, {counted(len(column.t), 'row')}"
+                raise RecordError(
+                    self.name, f"found {found} as force, expected three accelerations of one clock"
+                )
+        values = np.stack([column.si() for column in columns], axis=1)
+        return TriadSamples(columns[0].t, values, np.zeros(len(values), dtype=bool))
+
+
+def stretches_of(rows: Sequence[SectionRow], files: Mapping[str, RecordedTriads]) -> list[Stretch]:
+    """The stretches that rows are of, in recordings by name.
 
     A row that names no file is of the only one. Rows of other files are left out: they are not of samples.
     """
     only = next(iter(files)) if len(files) == 1 else ""
-    return [
-        Stretch(
-            row,
-            *(None if one is None else one.between(row.begin, row.end) for one in files[row.file or only]),
-        )
-        for row in rows
-        if (row.file or only) in files
-    ]
+    return [files[row.file or only].stretch(row) for row in rows if (row.file or only) in files]
 
 
-def _rows(file: _Recorded) -> tuple[list[SectionRow], list[Finding]]:
+def _rows(file: RecordedTriads) -> tuple[list[SectionRow], list[Finding]]:
     """Rows of a recording by its labels, its name, or what is found in it."""
     clock = file.acc or file.gyro
     assert clock is not None
     if file.record.labels and len(file.record.labels) == len(clock.t):
         rows = _labelled(file, clock)
         if rows:
-            return rows, []
+            return rows, _asked(file.name, rows)
     said = claim(file.name)
     if not said.kind:
         return rows_of_log(file.name, file.acc, file.gyro, _scale(file.record))
     name = PurePosixPath(file.name.replace("\\", "/")).stem
     row = _of_claim(said, name, file.name, "name")
-    asked = [] if row.kind != "turn" or row.angle is not None else [_which_angle(row)]
     if row.kind == "rest":
         return _held(file, clock, row)
-    return [_at_its_rate(file, row) if row.kind == "rate" else row], asked
+    rows = [_at_its_rate(file, row) if row.kind == "rate" else row]
+    return rows, _asked(file.name, rows)
 
 
-def _at_its_rate(file: _Recorded, row: SectionRow) -> SectionRow:
+def _at_its_rate(file: RecordedTriads, row: SectionRow) -> SectionRow:
     """A file that holds one rate by its name: its longest stretch at a steady rate, where it has others as well."""
     steady = () if file.gyro is None else steady_rates(file.gyro.t, file.gyro.values)
     if file.gyro is None or not steady:
@@ -171,7 +195,9 @@ def _at_its_rate(file: _Recorded, row: SectionRow) -> SectionRow:
     return replace(row, begin=float(t[longest.start]), end=float(t[longest.stop - 1]))
 
 
-def _held(file: _Recorded, clock: TriadSamples, row: SectionRow) -> tuple[list[SectionRow], list[Finding]]:
+def _held(
+    file: RecordedTriads, clock: TriadSamples, row: SectionRow
+) -> tuple[list[SectionRow], list[Finding]]:
     """A file that holds one rest by its name: its longest hold; a finding where there is none."""
     gyro = None if file.gyro is None else on_clock(file.gyro, clock.t)
     found = holds_of(clock.t, None if file.acc is None else file.acc.values, gyro)
@@ -186,7 +212,7 @@ def _held(file: _Recorded, clock: TriadSamples, row: SectionRow) -> tuple[list[S
     return [row if whole else replace(row, begin=begin, end=end)], []
 
 
-def _labelled(file: _Recorded, clock: TriadSamples) -> list[SectionRow]:
+def _labelled(file: RecordedTriads, clock: TriadSamples) -> list[SectionRow]:
     """A row for each run of one label that says something; labels that say nothing are none."""
     labels = np.array(file.record.labels)
     starts = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist()]
@@ -211,14 +237,14 @@ def _of_claim(said: Claim, name: str, file: str, why: str) -> SectionRow:
     )  # fmt: skip
 
 
-def _which_angle(row: SectionRow) -> Finding:
-    """The question after the angle of a turn."""
-    return Finding(
-        "not_stated",
-        f"{row.section} is a turn of an angle that nobody stated.",
-        row.file,
-        action="Write it into the column `angle` of sections.csv, with its sign.",
-    )
+def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:
+    """The question after the angles of turns that names or labels leave open."""
+    turns = [row for row in rows if row.kind == "turn" and row.angle is None]
+    if not turns:
+        return []
+    headline = f"The angle of {counted(len(turns), 'turn')} of {file} is not known."
+    action = "Write it into the column `angle` of sections.csv, with its sign."
+    return [Finding("not_stated", headline, counted_names([row.section for row in turns]), action=action)]
 
 
 def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
@@ -232,14 +258,6 @@ def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
         taken[name] = taken.get(name, 0) + 1
         named.append(replace(row, section=name if taken[name] == 1 else f"{name} {taken[name]}"))
     return named
-
-
-def _recorded(name: str, record: Record) -> _Recorded:
-    """A recording with its triads; raises `RecordError` where it has none."""
-    acc, gyro = _samples(record, "acc"), _samples(record, "gyro")
-    if acc is None and gyro is None:
-        raise RecordError(name, "found neither three accelerometers nor three gyros, expected one of the two")
-    return _Recorded(name, record, acc, gyro)
 
 
 def _samples(record: Record, sensor: str) -> TriadSamples | None:
