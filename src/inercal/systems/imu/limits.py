@@ -88,15 +88,6 @@ class Limits:
     """Scatter [m/s^2] of the mean specific force of a pose, 20 ug, up to which sensors are as good as those for
     navigation."""
 
-    ordinary_g_sensitivity: float = math.radians(0.1) / STANDARD_GRAVITY
-    """Standard deviation [(rad/s)/(m/s^2)] of the g-sensitivity of micromachined gyros, 0.1 deg/s per g."""
-
-    fine_g_sensitivity: float = math.radians(0.1 / 3600.0) / STANDARD_GRAVITY
-    """The same of gyros for navigation, 0.1 deg/h per g."""
-
-    fine_gyro_scatter: float = math.radians(0.2 / 3600.0)
-    """Scatter [rad/s] of the means of a gyro, 0.2 deg/h, up to which it is as good as those for navigation."""
-
     k2_probability: float = 5e-4
     """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
@@ -123,14 +114,6 @@ class Limits:
     gyro_drift_probability: float = 1e-2
     """The same of a drift of the gyro's scale factors: turns are few, and what they show less clearly shifts values,
     too. A sound recording is named once in a hundred, and stays ok where nothing is shifted by more than its u."""
-
-    # sections
-
-    led_tilt: float = 0.02
-    """Standard deviation [rad] of a vertical by the accelerometers of a unit that turns slowly."""
-
-    lever_arm: float = 0.1
-    """Distance [m] of accelerometers from the axis of a unit that turns."""
 
     # rows of means, known rates and turns
 

@@ -83,14 +83,15 @@ class Linear:
         self.local, self.width = _order(inside, [b.at for b in blocks if b.seen.any()], len(free))
         place = np.full(len(free), -1)
         place[self.local] = np.arange(len(self.local))
-        self._cells = [self._cell(b, place) for b in blocks if b.seen.any()]
+        self.sources = [b.sources for b in blocks if b.seen.any()]
+        self._blocks = [self._gathered(b, place) for b in blocks if b.seen.any()]
         at = np.concatenate([self.shared, self.local])
         self._sd, self._off, self._ruled = problem.sd[at], (problem.mean - x)[at], problem.ruled[at]
         self.sizes = np.array(
             [[np.log(size.median), size.spread] for size in problem.sizes.values()]
         ).reshape(-1, 2)
 
-    def _cell(self, block: RowBlock, place: Places) -> _Gathered:
+    def _gathered(self, block: RowBlock, place: Places) -> _Gathered:
         """A block by the free unknowns."""
         c, k, q = block.local.shape
         inside, at = len(self.local), place[block.at]
@@ -111,7 +112,9 @@ class Linear:
 
     def variances(self, z: Array) -> list[Array]:
         """Variances (c, k) of the rows of each block by the logarithms ``z`` of the components."""
-        return [cell.variance + np.tensordot(np.exp(2.0 * z), cell.scatter, axes=1) for cell in self._cells]
+        return [
+            cells.variance + np.tensordot(np.exp(2.0 * z), cells.scatter, axes=1) for cells in self._blocks
+        ]
 
     def sd(self, z: Array) -> Array:
         """Standard deviations beforehand of the free unknowns, the shared ones first."""
@@ -119,7 +122,7 @@ class Linear:
 
     def cost(self, z: Array) -> float:
         """Sum of squares at the point itself."""
-        sums = [np.sum(c.used * c.r**2 / v) for c, v in zip(self._cells, self.variances(z), strict=True)]
+        sums = [np.sum(c.used * c.r**2 / v) for c, v in zip(self._blocks, self.variances(z), strict=True)]
         return float(sum(sums) + np.sum((self._off / self.sd(z)) ** 2))
 
     def at(self, z: Array, damping: float = 0.0) -> ArrowSolution:
@@ -130,19 +133,19 @@ class Linear:
         weight, prior = 1.0 / sd**2, self._off / sd**2
         H, b, phi, size = np.diag(weight[:s]), prior[:s].copy(), float(self._off @ prior), 0.0
         B, g, flat = np.zeros((inside, s)), prior[s:].copy(), np.zeros((self.width + 1) * inside)
-        for cell, v in zip(self._cells, self.variances(z), strict=True):
-            w = cell.used / v
-            size += float(np.sum(np.log(v[cell.used > 0.0])))
-            WA, wr = cell.A * w.reshape(-1, 1), w * cell.r
-            H += cell.A.T @ WA
-            b += cell.A.T @ wr.ravel()
-            phi += float(np.sum(wr * cell.r))
+        for cells, v in zip(self._blocks, self.variances(z), strict=True):
+            w = cells.used / v
+            size += float(np.sum(np.log(v[cells.used > 0.0])))
+            WA, wr = cells.A * w.reshape(-1, 1), w * cells.r
+            H += cells.A.T @ WA
+            b += cells.A.T @ wr.ravel()
+            phi += float(np.sum(wr * cells.r))
             if inside:
-                LT = cell.L.transpose(0, 2, 1)
-                B += cell.gather @ (LT @ WA.reshape(*w.shape, s)).reshape(-1, s)
-                g += cell.gather @ (LT @ wr[..., None]).ravel()
-                products = (LT @ (w[..., None] * cell.L))[cell.low]
-                flat += np.bincount(cell.band, products, minlength=len(flat))
+                LT = cells.L.transpose(0, 2, 1)
+                B += cells.gather @ (LT @ WA.reshape(*w.shape, s)).reshape(-1, s)
+                g += cells.gather @ (LT @ wr[..., None]).ravel()
+                products = (LT @ (w[..., None] * cells.L))[cells.low]
+                flat += np.bincount(cells.band, products, minlength=len(flat))
         band = flat.reshape(self.width + 1, inside)
         if inside:
             band[0] += weight[s:]
@@ -176,28 +179,37 @@ class Linear:
         return self.at(z).value - 0.5 * float(np.sum(((z - self.sizes[:, 0]) / self.sizes[:, 1]) ** 2))
 
     def left(self, z: Array, solution: ArrowSolution) -> list[tuple[Array, Array]]:
-        """Of each block what the solution leaves of the residuals (c, k), and the part (c, k) of their variance that is
-        left; both 0 for rows that do not count."""
+        """Of each block what the solution leaves of the residuals (c, k), and the covariance (c, k, k) of that; both 0
+        for rows that do not count."""
         out = []
-        for cell, v in zip(self._cells, self.variances(z), strict=True):
-            c, k, _ = cell.L.shape
-            carried = (
-                np.where((cell.at >= 0)[..., None], solution.carried[cell.at], 0.0)
-                if len(self.local)
-                else None
-            )
-            A, rest = cell.A.reshape(c, k, -1), cell.r - (cell.A @ solution.shared).reshape(c, k)
-            used = np.zeros((c, k))
-            if carried is not None:
-                inside = np.where(cell.at >= 0, solution.local[cell.at], 0.0)
-                rest = rest - (cell.L @ inside[..., None])[..., 0]
-                A = A - cell.L @ carried
-                used += np.einsum(
-                    "ckp,cpq,ckq->ck", cell.L, solution.given[cell.at[:, :, None], cell.at[:, None]], cell.L
-                )
-            used += np.einsum("cks,st,ckt->ck", A, solution.covariance, A)
-            out.append((cell.used * rest, cell.used * (1.0 - used / v)))
+        for cells, v in zip(self._blocks, self.variances(z), strict=True):
+            A, L, given = self._by_shared(cells, solution), cells.L, self._given(cells, solution)
+            inside = np.append(solution.local, 0.0)[cells.at]
+            rest = cells.r - (cells.A @ solution.shared).reshape(v.shape) - (L @ inside[..., None])[..., 0]
+            covariance = -L @ given @ L.transpose(0, 2, 1) - A @ solution.covariance @ A.transpose(0, 2, 1)
+            covariance[:, range(v.shape[1]), range(v.shape[1])] += v
+            both = cells.used[:, :, None] * cells.used[:, None, :]
+            out.append((cells.used * rest, both * covariance))
         return out
+
+    def shares(self, z: Array, solution: ArrowSolution, J: Array) -> tuple[list[Array], Array]:
+        """Variances (c, k, p) of p numbers, whose derivatives by the first p shared unknowns are ``J`` (p, p), by the
+        noise of each row; and (s + l, p) by what is known beforehand of each unknown."""
+        C, of_rows = solution.covariance[:, : len(J)] @ J.T, []
+        for cells, v in zip(self._blocks, self.variances(z), strict=True):
+            of_rows.append((cells.used / v)[..., None] * (self._by_shared(cells, solution) @ C) ** 2)
+        return of_rows, (np.vstack([C, -solution.carried @ C]) / self.sd(z)[:, None]) ** 2
+
+    def _by_shared(self, cells: _Gathered, solution: ArrowSolution) -> Array:
+        """Derivatives (c, k, s) by the shared unknowns, those of sections carried along."""
+        carried = np.vstack([solution.carried, np.zeros((1, len(self.shared)))])[cells.at]
+        return np.asarray(cells.A.reshape(*cells.r.shape, -1) - cells.L @ carried)
+
+    def _given(self, cells: _Gathered, solution: ArrowSolution) -> Array:
+        """Covariances (c, q, q) of the unknowns of sections where the shared ones are known."""
+        there = cells.at >= 0
+        given = solution.given[cells.at[:, :, None], cells.at[:, None, :]] if len(self.local) else 0.0
+        return np.where(there[:, :, None] & there[:, None, :], given, 0.0)
 
 
 def _order(inside: Places, groups: list[Places], p: int) -> tuple[Places, int]:

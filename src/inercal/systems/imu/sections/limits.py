@@ -1,14 +1,110 @@
-"""Limits by which swings and moves of an IMU are judged; the book prints them."""
+"""Limits by which sections are found in recordings, and by which their names are checked; the book prints them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from inercal.foundation.units import STANDARD_GRAVITY
+
 
 @dataclass(frozen=True)
 class Limits:
-    """Thresholds of swings and moves; ``LIMITS`` are the ones in force."""
+    """Thresholds of the finding of sections; ``LIMITS`` are the ones in force."""
+
+    still_window: float = 0.4
+    """Length [s] of the windows whose variance tells rest from motion."""
+
+    shortest_hold: float = 0.65
+    """Shortest hold [s] that is read."""
+
+    valley_depth: float = 0.6
+    """Height of a valley between two humps of the variances, over that of the lower hump, up to which it is one."""
+
+    hump_windows: float = 4.0
+    """Windows that the peak of a hump holds at least, within half a power of ten of variance."""
+
+    restless_hold: float = 0.05
+    """Standard deviation of specific force in a window, as a part of gravity, from which nothing is held still."""
+
+    drift_in_hold: float = 0.02
+    """Change of the vertical [rad] from the first to the last third of a hold, beyond its noise, from which it is none:
+    the mean of a fan of directions is shorter than gravity by a 24th of its square."""
+
+    drift_sigmas: float = 5.0
+    """Change within a hold, over the u of that change by noise, that is put down to chance."""
+
+    hold_edge: float = 4.0
+    """Change of short means, over their scatter inside a hold, from which the hold is over."""
+
+    hold_edge_power: float = 4.0
+    """Mean square of short stretches about the mean of a hold, over that inside it, from which the hold is over."""
+
+    same_pose: float = 0.05
+    """Change of specific force, as a part of gravity, below which two holds in a row are one pose."""
+
+    harmless_rate: float = 0.05
+    """Rate [rad/s] up to which turning does no harm to the mean of accelerometers: 1e-3 m/s^2 over an arm of 0.4 m."""
+
+    slowest_telling: float = 0.2
+    """Rate of the vertical [rad/s] from which it tells the scale of a gyro in counts."""
+
+    fastest_telling: float = 3.0
+    """Rate of the vertical [rad/s] up to which it does: beyond, the accelerometers feel more than gravity."""
+
+    turning_hold: float = 10.0
+    """Distance of the gyro's mean in a hold from that of the others, over their scatter, from which it turns."""
+
+    holds_to_compare: int = 5
+    """Holds without which the means of the gyro are not compared."""
+
+    noise_dof: float = 8.0
+    """Degrees of freedom without which means of a length do not tell the noise."""
+
+    noise_change: float = 2.5
+    """Change of the noise from short to long means, over its u by chance, from which short ones say nothing of long
+    ones."""
+
+    side: float = math.radians(20.0)
+    """Angle [rad] from an axis within which a rest may be a side; and two sides within it are one taken twice."""
+
+    # the fit
+
+    ordinary_g_sensitivity: float = math.radians(0.1) / STANDARD_GRAVITY
+    """Standard deviation [(rad/s)/(m/s^2)] of the g-sensitivity of micromachined gyros, 0.1 deg/s per g."""
+
+    fine_g_sensitivity: float = math.radians(0.1 / 3600.0) / STANDARD_GRAVITY
+    """The same of gyros for navigation, 0.1 deg/h per g."""
+
+    fine_gyro_scatter: float = math.radians(0.2 / 3600.0)
+    """Scatter [rad/s] of the means of a gyro, 0.2 deg/h, up to which it is as good as those for navigation."""
+
+    contradiction: float = 1e-3
+    """Probability of the residuals below which sections contradict what is said of them."""
+
+    beyond_scatter: float = 3.0
+    """Logarithm of a scatter over its median beforehand, in standard deviations, beyond which no instrument has it."""
+
+    fewest_scatter_dof: float = 3.0
+    """Degrees of freedom of a scatter below which it is rather what was known of it than found."""
+
+    fewest_dof: float = 4.0
+    """Degrees of freedom by which u is told from U at least: of four U is 1.96 times the standard deviation."""
+
+    misplaced: float = math.radians(45.0)
+    """Angle [rad] from its name beyond which a section is not what its name says."""
+
+    large_placing: float = math.radians(10.0)
+    """Placing [rad] that is named."""
+
+    open_share: float = 0.3
+    """Standard uncertainty of a bias, as a part of the largest output, from which the sections leave it open."""
+
+    led_tilt: float = 0.02
+    """Standard deviation [rad] of a vertical by the accelerometers of a unit that turns slowly."""
+
+    lever_arm: float = 0.1
+    """Distance [m] of accelerometers from the axis of a unit that turns."""
 
     # swings
 

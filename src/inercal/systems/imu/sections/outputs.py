@@ -168,6 +168,7 @@ def _means(problem: Problem, point: Iterate) -> RowBlock:
         variance.reshape(n, 9),
         {name: (on * gain**2).reshape(n, 9) for name, on in problem.on.items()},
         r.seen.reshape(n, 9),
+        ("noise of the accelerometers",) * 6 + ("noise of the gyro",) * 3,
     )
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.systems.imu.limits import LIMITS
+from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
+from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.readings import Flags, Places, SectionArrays, side_by_side
 from inercal.systems.imu.sections.section import Section
@@ -68,7 +69,7 @@ class RowBlock:
     ``residual`` (c, k); ``shared`` (c, k, s) the derivatives by all shared unknowns; ``local`` (c, k, q) those by the
     unknowns of sections whose places in x are ``at`` (c, q), the same place at most once in a cell. Errors have the
     variance ``variance`` + sum of exp(2 z) ``scatter`` (c, k), by the name of each component. Rows not ``seen`` (c, k)
-    do not count.
+    do not count. ``sources`` (k,) are names in budgets of the errors of the rows of a cell.
     """
 
     residual: Array
@@ -78,6 +79,7 @@ class RowBlock:
     variance: Array
     scatter: dict[str, Array]
     seen: Flags
+    sources: tuple[str, ...]
 
 
 class Extra(Protocol):
@@ -216,8 +218,8 @@ def with_classes(problem: Problem, scatter: dict[str, float]) -> Problem:
     """The problem with the priors of K2 and G by the class of the instrument, by the ``scatter`` of its means [SI]."""
     sd, priors = problem.sd.copy(), problem.priors
     if priors.k2 is None:
-        fine = scatter.get("acc", np.inf) <= LIMITS.fine_scatter
-        sd[K2] = np.where(sd[K2] > 0.0, LIMITS.fine_k2 if fine else LIMITS.ordinary_k2, 0.0)
+        fine = scatter.get("acc", np.inf) <= IMU_LIMITS.fine_scatter
+        sd[K2] = np.where(sd[K2] > 0.0, IMU_LIMITS.fine_k2 if fine else IMU_LIMITS.ordinary_k2, 0.0)
     if priors.g_sensitivity is None:
         fine = scatter.get("gyro", np.inf) <= LIMITS.fine_gyro_scatter
         sd[G] = np.where(
@@ -231,7 +233,7 @@ def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) 
     groups, sessions = len(readings.rate_groups), len(readings.sessions)
     mean, sd = np.zeros(COMMON + groups + 6 * sessions), np.full(COMMON + groups + 6 * sessions, np.inf)
     sd[M] = sd[T] = priors.misalignment
-    sd[K2] = LIMITS.ordinary_k2 if priors.k2 is None else priors.k2
+    sd[K2] = IMU_LIMITS.ordinary_k2 if priors.k2 is None else priors.k2
     sd[G] = LIMITS.ordinary_g_sensitivity if priors.g_sensitivity is None else priors.g_sensitivity
     moving = (readings.rate != 0.0) & readings.seen[:, 2].any(axis=1)
     rotated = bool(moving.any()) or any(extra.rotates for extra in extras)

@@ -1,0 +1,189 @@
+"""Findings about a calibration from sections, and its verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from inercal.foundation.findings import EVERYTHING, Finding, Status
+from inercal.foundation.records.places import counted, counted_names
+from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
+from inercal.systems.imu.sections.calibration import SectionCalibration, contradicted
+from inercal.systems.imu.sections.checks import side
+from inercal.systems.imu.sections.limits import LIMITS
+
+_WORDS = {
+    "acc": "accelerometers",
+    "gyro": "gyro",
+    "acc session": "bias of the accelerometers from session to session",
+    "gyro session": "bias of the gyro from session to session",
+}
+
+
+def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
+    """All that a calibration says of its sections and of itself."""
+    return (
+        *_contradictions(found),
+        *_signs(found),
+        *_outlying(found),
+        *_scatters(found),
+        *_placing(found),
+        *_by_prior(found),
+    )
+
+
+def verdict(found: SectionCalibration, before: Sequence[Finding]) -> tuple[Status, str]:
+    """Status and message of a calibration; ``before`` are the findings of `before_the_fit`."""
+    sections = counted(len(found.problem.readings.sections), "section")
+    if before:
+        return Status.INCONSISTENT, before[0].message
+    if not found.converged:
+        return Status.NOT_CONVERGED, f"the search from {sections} ended before it reached a minimum"
+    against = [*_contradictions(found), *_signs(found)]
+    if against:
+        return Status.INCONSISTENT, against[0].message
+    return Status.OK, f"{len(found.names)} coefficients from {sections}"
+
+
+def _section(found: SectionCalibration, k: int) -> str:
+    """A section in words."""
+    section = found.problem.readings.sections[k]
+    return section.name or f"section {k + 1}"
+
+
+def _contradictions(found: SectionCalibration) -> Iterator[Finding]:
+    """Sections that contradict what is said of them."""
+    sections = found.problem.readings.sections
+    if found.converged and contradicted(found):
+        sigmas = found.placed_sigmas.max(axis=1)
+        items: tuple[dict[str, str | float], ...] = tuple(
+            {"section": _section(found, k), "off its place [deg]": math.degrees(found.placed[k].max())}
+            for k in np.argsort(-sigmas)[:3].tolist()
+            if sigmas[k] > 0.0
+        )
+        lone = float(found.outlying.min()) < LIMITS.contradiction or not items
+        worst = int(np.argmin(found.outlying) if lone else np.argmax(sigmas))
+        wide = max(found.beyond, key=lambda name: found.beyond[name], default="")
+        if found.probability < LIMITS.contradiction:
+            p = f"p = {found.probability:.1g}"
+            text = f"Sections contradict what is said of them ({p}), most of all {_section(found, worst)}."
+        else:
+            what = "placing" if wide == "placing" else f"means of the {_WORDS.get(wide, wide)}"
+            where = f"Sections contradict each other, most of all {_section(found, worst)}"
+            text = f"{where}: {what} would scatter more than in any instrument."
+        yield Finding(
+            "sections_contradict",
+            text,
+            sections[worst].where,
+            EVERYTHING,
+            action="Check names, units and signs of these sections, or leave one out.",
+            items=items,
+        )
+    if found.freed:
+        yield Finding(
+            "unit_suspect",
+            "The scale factors are far from those of the stated units, as the sections show.",
+            harm=EVERYTHING,
+            action="Check the units in the map, and the angles and rates of the sections.",
+        )
+
+
+def _signs(found: SectionCalibration) -> Iterator[Finding]:
+    """Negative scale factors: exchanged sides leave no other trace."""
+    for name, value in zip(found.names, found.x, strict=True):
+        if name.startswith(("K1_", "S_")) and value < 0.0:
+            sensor, axis = ("acc" if name.startswith("K1") else "gyro"), name[-1]
+            yield Finding(
+                "sign_suspect",
+                f"{sensor}_{axis} looks reversed: {name} is {value:.4g}.",
+                harm=EVERYTHING,
+                action=f"Check the sign of {sensor}_{axis} in the map, and whether +{axis} and -{axis} are exchanged.",
+            )
+
+
+def _outlying(found: SectionCalibration) -> Iterator[Finding]:
+    """The section that lies farthest off all others, left out in turn."""
+    p = found.outlying
+    k = int(np.argmin(p))
+    if p[k] < IMU_LIMITS.outlier_risk / max(int(np.sum(p < 1.0)), 1):
+        yield Finding(
+            "outlying_section",
+            f"{_section(found, k)} lies off what all other sections say (p = {p[k]:.1g}).",
+            found.problem.readings.sections[k].where,
+            EVERYTHING,
+            action="Was the instrument moving, or placed otherwise? Leave the section out, or measure it again.",
+        )
+
+
+def _scatters(found: SectionCalibration) -> Iterator[Finding]:
+    """Scatters beyond the stated noise, or known by hardly more than a guess."""
+    for sensor in sorted(found.excess):
+        yield Finding(
+            "excess_scatter",
+            f"The means of the {_WORDS[sensor]} scatter by more than their stated noise explains, and u allows for it.",
+            harm=(),
+            action="State the noise of the means, or look for what moved or warmed the instrument.",
+        )
+    for name, dof in found.scatter_dof.items():
+        if dof < LIMITS.fewest_scatter_dof:
+            what = "placing" if name == "placing" else f"scatter of the {_WORDS.get(name, name)}"
+            act = f"Measure a second round, or state the {'placing' if name == 'placing' else 'noise of the means'}."
+            yield Finding(
+                "placing_by_prior" if name == "placing" else "scatter_by_prior",
+                f"The {what} is rather what is usual than found: {counted(round(dof), 'degree')} of freedom.",
+                action=act,
+            )
+
+
+def _placing(found: SectionCalibration) -> Iterator[Finding]:
+    """Sections far off their places, and rates about one side that nobody says were one setup."""
+    angles = found.placed.max(axis=1)
+    large = np.flatnonzero(angles > LIMITS.large_placing).tolist()
+    if large:
+        worst = int(np.argmax(angles))
+        yield Finding(
+            "large_placing",
+            f"{_section(found, worst)} lies {math.degrees(angles[worst]):.0f} deg off its place.",
+            found.problem.readings.sections[worst].where,
+            EVERYTHING,
+            action="Correct its direction or axis, or leave the section out.",
+            items=tuple(
+                {"section": _section(found, k), "off its place [deg]": math.degrees(found.placed[k].max())}
+                for k in large
+            ),
+        )
+    alone: dict[str, int] = {}
+    for section in found.problem.readings.sections:
+        if (
+            section.kind == "rate"
+            and section.axis is not None
+            and not section.setup
+            and section.axis_u != 0.0
+        ):
+            axis = side(section.axis).lstrip("+-")
+            alone[axis] = alone.get(axis, 0) + 1
+    axes = sorted(axis for axis, count in alone.items() if axis and count > 1)
+    if axes:
+        yield Finding(
+            "one_setup",
+            f"Several rates about {counted_names(axes)} are taken to be placed anew each time.",
+            harm=(),
+            action="Give those between which the instrument was not touched the same setup.",
+        )
+
+
+def _by_prior(found: SectionCalibration) -> Iterator[Finding]:
+    """Terms of which the sections say less than what was known before."""
+    names = (*found.by_prior, *found.leaning)
+    if names:
+        few = "is by" if len(names) == 1 else "are by"
+        yield Finding(
+            "by_prior",
+            f"{counted(len(names), 'term')} {few} what was known before more than by the sections, or lean on it.",
+            action="Add sections that show these terms, or take them for what they are.",
+            items=tuple(
+                {"term": name, "by": "what was known" if name in found.by_prior else "both"} for name in names
+            ),
+        )

@@ -1,0 +1,81 @@
+"""Sections that are missing where those there leave a coefficient open, and the rest to add."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from inercal.systems.imu.identified import pose_words
+from inercal.systems.imu.sections.arrow import Linear
+from inercal.systems.imu.sections.limits import LIMITS
+from inercal.systems.imu.sections.outputs import centred, rows
+from inercal.systems.imu.sections.priors import Priors
+from inercal.systems.imu.sections.problem import Extra, Problem, problem_of
+from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.start import first_guess
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, K1, G, S
+
+
+class Missing(NamedTuple):
+    """Coefficients that stay open, by name, and in words a direction of specific force that tells most of them; empty
+    where they are the gyro's, which needs a rest in any pose."""
+
+    terms: tuple[str, ...]
+    pose: str
+
+
+def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...] = ()) -> Missing | None:
+    """What sections leave open of the coefficients that have no prior, at the first guess; None if nothing."""
+    terms, volume = _open(sections, priors, extras)
+    if not terms:
+        return None
+    if all(name.startswith("D_F") for name in terms):
+        return Missing(terms, "")
+    told = any(s.kind == "rest" and s.up is not None for s in sections)
+    x = first_guess(problem_of(sections, priors, extras)).x
+    best, pose = volume, np.array([0.0, 0.0, 1.0])
+    for way in itertools.product((1.0, 0.0, -1.0), repeat=3):
+        if any(way):
+            up = np.array(way) / np.linalg.norm(way)
+            output = x[K0] + x[K1] * priors.site.gravity * up
+            added = Section("rest", acc=output, acc_var=np.full(3, 1e-6), up=up if told else None, up_u=0.01)
+            there = _open([*sections, added], priors, extras)[1]
+            if there < best - 1e-6:
+                best, pose = there, up
+    return Missing(terms, pose_words(pose))
+
+
+def _open(
+    sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]
+) -> tuple[tuple[str, ...], float]:
+    """Names of the coefficients without a prior that stay open, and the logarithm of the volume in which all are."""
+    problem = problem_of(sections, priors, extras)
+    point = centred(problem, first_guess(problem))
+    linear = Linear(problem, point.x, rows(problem, point))
+    z = np.array([np.log(size.median) for size in problem.sizes.values()])
+    try:
+        covariance = linear.at(z).covariance
+    except LinAlgError:
+        covariance = np.full((len(linear.shared),) * 2, np.inf)
+    flat = [
+        k for k, p in enumerate(linear.shared) if p < len(COEFFICIENTS) and not np.isfinite(problem.sd[p])
+    ]
+    size = np.array([LIMITS.open_share * _full_scale(problem, int(linear.shared[k])) for k in flat])
+    u = np.sqrt(np.abs(np.diag(covariance)[flat]))
+    names = tuple(COEFFICIENTS[linear.shared[k]] for k in np.array(flat, dtype=int)[~(u < size)])
+    return names, float(np.sum(np.log(np.maximum(u / size, 1e-3)))) if len(flat) else 0.0
+
+
+def _full_scale(problem: Problem, p: int) -> float:
+    """The largest output of the triad of a bias, that by g-sensitivity among them; 1 for any other coefficient."""
+    name, y = COEFFICIENTS[p], problem.readings.y
+    if name.startswith("K0"):
+        return float(np.nanmax(np.abs(y[:, :2])))
+    if name.startswith("D_F"):
+        drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
+        return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)
+    return 1.0
