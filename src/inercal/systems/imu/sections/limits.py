@@ -160,6 +160,20 @@ class Limits:
     """Relative standard uncertainty of a gyro by the turns of gravity in a swing at least; the same in rad of its
     axes."""
 
+    # moves
+
+    move_walk: float = math.radians(0.03)
+    """Scatter of moves [rad/sqrt(s)], median beforehand."""
+
+    move_walk_spread: float = 2.0
+    """Standard deviation of its logarithm."""
+
+    integrated_anew: float = 2e-3
+    """Change of a rotation [rad] from which it is integrated anew; smaller ones by derivatives are 2e-6 off."""
+
+    level_axis: float = 0.1
+    """Length of a carried level axis across the vertical below which it tells no heading."""
+
 
 LIMITS = Limits()
 """The limits in force."""
