@@ -25,13 +25,14 @@ def filled(off):
 
 @dataclass
 class Record:
-    """Samples, the begin and end of each rest (both within it), and the truth by name."""
+    """Samples, the begin and end of each rest, the truth by name, and attitudes in the rests."""
 
     t: np.ndarray
     acc: np.ndarray
     gyro: np.ndarray
     rests: list
     truth: dict
+    attitudes: Rotation
 
     def sections(self, **said):
         """The rests; ``said`` holds what is known of each, by the name of the field."""
@@ -111,4 +112,6 @@ def turned_by_hand(
     for name, value in (("K0", k0), ("K1", k1), ("D_F", d), ("S", s)):
         truth |= {f"{name}_{axis}": value[i] for i, axis in enumerate("xyz")}
     samples = np.round(rate * np.array([(k * period, k * period + hold) for k in range(rests)])).astype(int)
-    return Record(t, acc, d + s * w, [(int(a) + 1, int(b)) for a, b in samples], truth)
+    return Record(
+        t, acc, d + s * w, [(int(a) + 1, int(b)) for a, b in samples], truth, Rotation.concatenate(attitude)
+    )

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from moved_units import GRAVITY, LATITUDE, turned_by_hand
+from moved_units import EARTH, GRAVITY, LATITUDE, turned_by_hand
 from scipy.spatial.transform import Rotation
 
 from inercal.foundation.geometry.earth import Site
@@ -14,6 +14,7 @@ from inercal.systems.imu.sections.priors import Priors
 from inercal.systems.imu.sections.problem import problem_of
 from inercal.systems.imu.sections.start import first_guess
 from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, LOCAL, SWIVEL, TILT
+from rows import for_each
 
 PRIORS = Priors(Site(GRAVITY, (), LATITUDE), mounting_u=2e-3, clock_u=1e-3)
 
@@ -26,25 +27,39 @@ def some_unknowns(rng):
     return x
 
 
-def test_rotations_are_products_of_all_samples():
-    """Against SciPy's, sample by sample; of moves of unequal length."""
-    rng = np.random.default_rng(1)
+def true_unknowns(record):
+    """Common unknowns (43,) by the truth."""
+    x = np.zeros(COMMON)
+    x[: len(COEFFICIENTS)] = [
+        record.truth.get(name, float(name[:2] in ("K1", "S_"))) for name in COEFFICIENTS
+    ]
+    return x
+
+
+@for_each("rate, move, most", [(100.0, 2.0, 1e-5), (20.0, 2.0, 4e-4), (50.0, 0.8, 4e-4)])
+def test_rotations_are_those_of_the_attitudes(rate, move, most):
+    """By samples without noise; what earth rate adds is below 1e-3 rad and of its own."""
+    record = turned_by_hand(np.random.default_rng(1), 12, rate=rate, move=move, noise=(0.0, 0.0))
+    found = rotations(increments(record.moves()), true_unknowns(record), np.zeros((11, 3))).R
+    east = np.array([np.cos(LATITUDE), 0.0, np.sin(LATITUDE)])
+    spun = record.attitudes[:-1].inv().apply(EARTH * (move + 1 / rate) * east)
+    true = Rotation.from_rotvec(spun) * record.attitudes[:-1].inv() * record.attitudes[1:]
+    off = (true.inv() * Rotation.from_matrix(found)).magnitude()
+    assert np.sqrt(np.mean(off**2)) < most
+
+
+def test_rotations_of_moves_do_not_know_each_other():
+    """Each alone is as beside longer ones; a bias of a session is one of all outputs."""
+    rng = np.random.default_rng(11)
     record, x = turned_by_hand(rng, 4), some_unknowns(rng)
-    moves = record.moves()
+    moves, bias = record.moves(), rng.normal(0, 1e-3, (3, 3))
     moves[1] = replace(moves[1], **{name: getattr(moves[1], name)[:77] for name in ("t", "gyro", "acc")})
-    bias = rng.normal(0, 1e-3, (3, 3))
-    found = rotations(increments(moves), x, bias)
-    M, T = np.eye(3), np.eye(3)
-    for matrix, at in ((M, 6), (T, 21)):
-        matrix[[0, 0, 1, 1, 2, 2], [1, 2, 0, 2, 0, 1]] = x[at : at + 6]
+    together = rotations(increments(moves), x, bias)
     for k, move in enumerate(moves):
-        attitude = Rotation.identity()
-        for i in range(len(move.t) - 1):
-            y, f = (0.5 * (v[i] + v[i + 1]) for v in (move.gyro, move.acc))
-            f = np.linalg.solve(M, (f - x[:3]) / x[3:6])
-            w = np.linalg.solve(T, (y - x[15:18]) / x[18:21] - x[27:36].reshape(3, 3) @ f - bias[k])
-            attitude = attitude * Rotation.from_rotvec(w * (move.t[i + 1] - move.t[i]))
-        np.testing.assert_allclose(found.R[k], attitude.as_matrix(), atol=1e-12)
+        other = x.copy()
+        other[15:18] += x[18:21] * bias[k]
+        alone = rotations(increments([move]), other, np.zeros((1, 3)))
+        np.testing.assert_allclose(alone.R[0], together.R[k], atol=1e-12)
 
 
 def test_derivatives_of_rotations():
@@ -91,7 +106,7 @@ def test_rows_have_the_derivatives_of_differences():
     moves = record.moves()
     moves = [
         moves[0],
-        replace(moves[2], turn=Rotation.from_matrix(true_rotation(record, 2)).as_rotvec(), turn_u=0.01),
+        replace(moves[2], turn=(record.attitudes[2].inv() * record.attitudes[3]).as_rotvec(), turn_u=0.01),
         moves[3],
     ]
     extra = move_rows(5, moves, PRIORS)
@@ -120,15 +135,6 @@ def test_rows_have_the_derivatives_of_differences():
         by = (at(point.x - step) - at(point.x + step)) / 2e-6
         told = np.einsum("ckq,cq->ck", block.local, block.at == p)
         np.testing.assert_allclose(np.where(block.seen, told - by, 0.0), 0.0, atol=1e-3)
-
-
-def true_rotation(record, k):
-    """The rotation of a move by the true coefficients."""
-    x = np.zeros(COMMON)
-    x[: len(COEFFICIENTS)] = [
-        record.truth.get(name, float(name[:2] in ("K1", "S_"))) for name in COEFFICIENTS
-    ]
-    return rotations(increments(record.moves()[k : k + 1]), x, np.zeros((1, 3))).R[0]
 
 
 def test_a_record_in_the_hand_gives_its_coefficients():

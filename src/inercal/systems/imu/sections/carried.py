@@ -1,7 +1,9 @@
 """Rotations of moves by the samples of a gyro, all moves side by side, with their derivatives.
 
-Over a sample interval the rotation vector is phi = T^-1 [(Y - D_F dt) / S - G X - b dt], with Y and X the trapezoidal
-integrals of the outputs and of specific force, and b what a session adds to the bias. A change d of phi_i turns what
+Over a sample interval the rate integrates to phi = T^-1 [(Y - D_F dt) / S - G X - b dt], with Y and X the integrals of
+the outputs and of specific force, and b what a session adds to the bias. Y is that of a cubic through four samples, and
+what the axis turns within an interval adds phi x (phi_next - phi_before) / 24 (Bortz 1971, IEEE Trans. Aerospace and
+Electronic Systems 7(1)): at 20 Hz trapezoids alone are off by 10 mrad in a fast move. A change d of phi_i turns what
 was before the move by R_i J(phi_i) d, R_i the rotation before it and J the left Jacobian of the rotation group (Sola,
 Deray, Atchuthan, arXiv:1812.01537). So sums of R_i J times dt, phi and X are all that is needed.
 """
@@ -10,11 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.systems.imu.sections.unknowns import CLOCK, COMMON, D_F, K0, K1, OFF, G, M, S, T, matrix
+from inercal.systems.imu.sections.unknowns import (
+    CLOCK,
+    COMMON,
+    D_F,
+    K0,
+    K1,
+    OFF,
+    G,
+    M,
+    S,
+    T,
+    cross,
+    matrix,
+)
+
+_EVEN: Final = 1.2
+"""Ratio of neighbouring steps of time up to which a cubic is laid through their samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +106,19 @@ def increments(moves: Sequence[Move]) -> Increments:
         dt[: len(step), k] = step
         for padded, y in ((gyro, move.gyro), (acc, move.acc)):
             if y is not None:
-                padded[: len(step), k] = 0.5 * (y[1:] + y[:-1]) * step[:, None]
+                padded[: len(step), k] = _mean_outputs(y, step) * step[:, None]
     return Increments(dt, gyro, acc)
+
+
+def _mean_outputs(y: Array, step: Array) -> Array:
+    """Means (L - 1, 3) over the intervals of outputs y (L, 3): of cubics, at the ends and about uneven steps of
+    straight lines."""
+    mean = 0.5 * (y[1:] + y[:-1])
+    if len(step) > 2:
+        even = np.maximum(step[2:], step[:-2]) < _EVEN * np.minimum(step[2:], step[:-2])
+        even &= np.abs(np.log(step[1:-1] / step[2:])) < np.log(_EVEN)
+        mean[1:-1] -= np.where(even[:, None], (y[3:] - y[2:-1] - y[1:-2] + y[:-3]) / 24.0, 0.0)
+    return np.asarray(mean)
 
 
 def rotations(moved: Increments, unknowns: Array, session: Array) -> Rotations:
@@ -99,6 +129,7 @@ def rotations(moved: Increments, unknowns: Array, session: Array) -> Rotations:
     force = (moved.acc - dt * x[K0]) / x[K1] @ np.linalg.inv(matrix(x[M])).T
     drift = force @ g.T
     phi = (moved.gyro - dt * x[D_F] - s * (drift + dt * session)) @ A.T
+    phi += _turning_axes(phi)
     steps, L, m = exponentials(phi), *moved.dt.shape
     R = np.empty((L + 1, m, 3, 3))
     R[0] = np.eye(3)
@@ -117,6 +148,14 @@ def rotations(moved: Increments, unknowns: Array, session: Array) -> Rotations:
     # a clock that is fast makes intervals too long
     out[:, :, CLOCK] = -np.einsum("mikk->mi", sums[..., 1:4])
     return Rotations(x.copy(), session.copy(), R[-1], out, -by[0] * s)
+
+
+def _turning_axes(phi: Array) -> Array:
+    """What the turning of their axes adds to the rotation vectors (L, m, 3) of intervals."""
+    change = np.zeros_like(phi)
+    change[:-1] += phi[1:]
+    change[1:] -= phi[:-1]
+    return np.asarray(cross(phi, change) / 24.0)
 
 
 def net_rotations(phi: Array) -> Array:

@@ -174,6 +174,24 @@ class Limits:
     level_axis: float = 0.1
     """Length of a carried level axis across the vertical below which it tells no heading."""
 
+    least_sweep: float = 0.1
+    """Angle [rad] that a move of median size sweeps at least."""
+
+    largest_sweep: float = 12.0
+    """Angle [rad] that it sweeps at most."""
+
+    open_scale: float = 0.5
+    """Relative standard deviation of a scale of the gyro that nothing but moves tells."""
+
+    raised_u: float = 1.2
+    """Growth of u of the accelerometers by moves, from which these have no say in them."""
+
+    raised_scatter: float = 2.0
+    """Growth of the logarithm of their scatter, in standard deviations, from which they have none."""
+
+    held_scatter: float = 0.05
+    """Standard deviation of the logarithm of a scatter that moves must not change."""
+
 
 LIMITS = Limits()
 """The limits in force."""
