@@ -140,8 +140,8 @@ class Bench:
             said["level_u"] = level
         before, after = (self.noisy(self.unit.accelerometers(f[k]), "acc") for k in (0, -1))
         return Section(
-            "turn", acc=before, acc_after=after, gyro=self.noisy(mean, "gyro"), angle=angle, angle_u=angle_u, duration=duration,
-            **said, **self.variances(), **more,
+            "turn", acc=before, acc_after=after, gyro=self.noisy(mean, "gyro"),
+            angle=angle, angle_u=angle_u, duration=duration, **said, **self.variances(), **more,
         )  # fmt: skip
 
     def spin(
@@ -173,5 +173,8 @@ class Bench:
         said = {"axis": axis, "up": top} if told else {}
         if level is not None:
             said["level_u"] = level
-        return Section("rate", gyro=self.noisy(mean, "gyro"), rate=rate, rate_u=rate_u, **said,
-                       **{k: v for k, v in self.variances().items() if k == "gyro_var"}, **more)  # fmt: skip
+        if not told:  # accelerometers tell which way is up
+            said["acc"] = self.noisy(self.unit.accelerometers(f).mean(axis=0), "acc")
+        said |= self.variances()
+        gyro = self.noisy(mean, "gyro")
+        return Section("rate", gyro=gyro, rate=rate, rate_u=rate_u, **said, **more)

@@ -5,15 +5,22 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc
+from scipy.linalg import LinAlgError
+from scipy.special import chdtrc
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.inference.variances import weighed
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
+from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.problem import Iterate, Problem
+from inercal.systems.imu.sections.scatters import mode, nodes
 from inercal.systems.imu.sections.unknowns import SWIVEL, TILT
 
 _TOLD: Final = 1e-6
 """Share of the variance of a residual below which the section itself settles it."""
+
+_LEAST_WEIGHT: Final = 1e-3
+"""Weight of a node below which it is left out of such a probability."""
 
 
 def of_sensors(problem: Problem, rest: Array, covariance: Array) -> dict[str, float]:
@@ -33,23 +40,45 @@ def of_sensors(problem: Problem, rest: Array, covariance: Array) -> dict[str, fl
     return out
 
 
-def of_sections(rest: Array, covariance: Array, chi2: float, freedom: float, stated: bool) -> Array:
-    """Probabilities (n,) that a sound section lies as far off what all others say, by its residuals ``rest`` (n, k) and
-    their ``covariance`` (n, k, k): as if it were left out. Where noise is not ``stated`` the others tell it."""
-    out = np.ones(len(rest))
+def of_sections(rest: Array, covariance: Array) -> tuple[Array, Array]:
+    """Squared distances (n,) of sections from what all others say, and how many directions (n,) each has.
+
+    ``rest`` (n, k) are the residuals of means, ``covariance`` (n, k, k) theirs; it is as if each section were left out.
+    """
+    off, told = np.zeros(len(rest)), np.zeros(len(rest))
     for k, (r, C) in enumerate(zip(rest, covariance, strict=True)):
         used = np.diag(C) > 0.0
-        if not used.any():
-            continue
-        size = 1.0 / np.sqrt(np.diag(C)[used])
-        values, vectors = np.linalg.eigh(C[np.ix_(used, used)] * np.outer(size, size))
-        told = values > _TOLD
-        q = int(told.sum())
-        off = float(np.sum((vectors.T @ (r[used] * size))[told] ** 2 / values[told]))
-        if stated:
-            out[k] = chdtrc(q, off)
-        elif freedom - q >= 1.0:
-            out[k] = fdtrc(q, freedom - q, (off / q) / max((chi2 - off) / (freedom - q), 1e-12))
+        if used.any():
+            size = 1.0 / np.sqrt(np.diag(C)[used])
+            values, vectors = np.linalg.eigh(C[np.ix_(used, used)] * np.outer(size, size))
+            left = values > _TOLD
+            off[k] = np.sum((vectors.T @ (r[used] * size))[left] ** 2 / values[left])
+            told[k] = left.sum()
+    return off, told
+
+
+def outlying(linear: Linear, z: Array, solution: ArrowSolution) -> Array:
+    """Probabilities (n,) that a sound section lies as far off what all others say.
+
+    Where variances are not stated, the others tell them: those of the farthest section are found without it, and for
+    the rest, which are hardly outliers then, the probability is 1.
+    """
+    rest, covariance = linear.left(z, solution)[0]
+    off, told = of_sections(rest, covariance)
+    p = np.where(told > 0, chdtrc(np.maximum(told, 1.0), off), 1.0)
+    if not len(z):
+        return np.asarray(p)
+    worst, out = int(np.argmin(p)), np.ones(len(p))
+    if p[worst] < LIMITS.suspect_section:
+        without = linear.without(worst)
+        try:
+            logs, volume = nodes(*mode(without, z))
+            weights = weighed(np.array([without.likelihood(there) for there in logs]) + volume)
+            heavy = weights > _LEAST_WEIGHT
+            found = [of_sections(*linear.left(there, linear.at(there))[0])[0][worst] for there in logs[heavy]]
+        except LinAlgError:
+            return out
+        out[worst] = weights[heavy] @ chdtrc(told[worst], np.array(found))
     return out
 
 

@@ -8,7 +8,8 @@ left is a small problem of the shared unknowns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -91,6 +92,15 @@ class Linear:
             [[np.log(size.median), size.spread] for size in problem.sizes.values()]
         ).reshape(-1, 2)
 
+    def without(self, section: int) -> Linear:
+        """The problem without the means of a section."""
+        first, *others = self._blocks
+        used = first.used.copy()
+        used[section] = 0.0
+        out = copy(self)
+        out._blocks = [replace(first, used=used), *others]
+        return out
+
     def _gathered(self, block: RowBlock, place: Places) -> _Gathered:
         """A block by the free unknowns."""
         c, k, q = block.local.shape
@@ -149,6 +159,7 @@ class Linear:
         band = flat.reshape(self.width + 1, inside)
         if inside:
             band[0] += weight[s:]
+            band[0] = np.where(band[0] > 0.0, band[0], 1.0)  # tilts of a section that is left out
             scale = 1.0 / np.sqrt(band[0])
             for k in range(self.width + 1):
                 band[k, : inside - k] *= scale[: inside - k] * scale[k:]

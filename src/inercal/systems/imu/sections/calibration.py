@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -11,7 +12,8 @@ from scipy.special import chdtrc, stdtrit
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.inference.variances import degrees, second_moment, weighed
-from inercal.systems.imu.sections.agreement import of_placing, of_sections, of_sensors
+from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
+from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
@@ -21,7 +23,14 @@ from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import solved
 from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, SWIVEL, TILT, S
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, LOCAL, SWIVEL, TILT, S
+
+_SOFTENED: Final = (1e-3, 3e-5, 1e-6)
+"""Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
+tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
+
+_SOFT: Final = 100.0
+"""Growth of a variance up to which it makes no other valley."""
 
 
 @short_repr
@@ -107,7 +116,8 @@ def calibrate_sections(
     """Calibrate from sections, of which at least one has an output of a sensor.
 
     A sensor whose residuals contradict its stated noise is given a scatter of its own. Where sections contradict what
-    is known and a fit without the prior of the scale factors does not, that prior is dropped.
+    is known, and a fit with the priors of ordinary instruments does not, or one without the prior of the scale factors,
+    it is taken.
 
     Raises
     ------
@@ -115,14 +125,21 @@ def calibrate_sections(
         Too little is known for any solution.
     """
     found = _calibrated(sections, priors, extras)
-    if contradicted(found) and (priors.acc_scale is not None or priors.gyro_scale is not None):
-        free = replace(priors, acc_scale=_freed(priors.acc_scale), gyro_scale=_freed(priors.gyro_scale))
+    if not (found.converged and contradicted(found)):
+        return found
+    ordinary = replace(
+        priors,
+        k2=IMU_LIMITS.ordinary_k2 if priors.k2 is None else priors.k2,
+        g_sensitivity=LIMITS.ordinary_g_sensitivity if priors.g_sensitivity is None else priors.g_sensitivity,
+    )
+    free = replace(ordinary, acc_scale=_freed(priors.acc_scale), gyro_scale=_freed(priors.gyro_scale))
+    for other in (ordinary, free):
         try:
-            other = _calibrated(sections, free, extras)
+            anew = _calibrated(sections, other, extras)
         except LinAlgError:
-            return found
-        if other.converged and not contradicted(other):
-            return replace(other, freed=True)
+            continue
+        if anew.converged and not contradicted(anew):
+            return replace(anew, freed=other is free)
     return found
 
 
@@ -154,6 +171,10 @@ def _fit(problem: Problem) -> _Fit:
     z, point = np.array([np.log(size.median) for size in problem.sizes.values()]), first_guess(problem)
     spread, noise = np.eye(len(z)), _noise(problem, point, z)
     problem = with_classes(problem, noise)
+    for part in _SOFTENED:
+        softer = _softened(problem, part)
+        if softer is not None:
+            point, _, _ = solved(softer, point, z)
     for _ in range(3):
         point, linear, converged = solved(problem, point, z)
         z, spread = mode(linear, z)
@@ -164,6 +185,19 @@ def _fit(problem: Problem) -> _Fit:
         point = _shortened(problem, point, linear, linear.at(z), z)
     point, linear, converged = solved(problem, point, z)
     return _Fit(problem, point, linear, z, spread, converged)
+
+
+def _softened(problem: Problem, part: float) -> Problem | None:
+    """The problem with a noise of means of at least this part of the largest outputs; None where it is no less."""
+    r = problem.readings
+    largest = np.array(
+        [np.max(np.abs(r.y[:, kinds][r.seen[:, kinds]]), initial=0.0) for kinds in ([0, 1], [2])]
+    )
+    least = (part * largest[[0, 0, 1], None]) ** 2
+    softer = np.where(r.stated, np.maximum(r.variance, least), r.variance)
+    if np.all(softer <= _SOFT * r.variance):
+        return None
+    return replace(problem, readings=replace(r, variance=softer))
 
 
 def _noise(problem: Problem, point: Iterate, z: Array) -> dict[str, float]:
@@ -262,7 +296,7 @@ def _result(fit: _Fit) -> SectionCalibration:
         excess=problem.priors.excess,
         freed=False,
         residuals=misfit(problem, fit.point),
-        outlying=of_sections(*means, best.chi2, freedom, not problem.sizes),
+        outlying=outlying(linear, z, best) if fit.converged else np.ones(len(x[problem.shared :]) // LOCAL),
         placed=placed,
         placed_sigmas=sigmas,
         converged=fit.converged,

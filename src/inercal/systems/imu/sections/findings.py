@@ -11,7 +11,7 @@ from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.calibration import SectionCalibration, contradicted
-from inercal.systems.imu.sections.checks import side
+from inercal.systems.imu.sections.checks import direction
 from inercal.systems.imu.sections.limits import LIMITS
 
 _WORDS = {
@@ -35,7 +35,7 @@ def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
 
 
 def verdict(found: SectionCalibration, before: Sequence[Finding]) -> tuple[Status, str]:
-    """Status and message of a calibration; ``before`` are the findings of `before_the_fit`."""
+    """Status and message of a calibration; ``before`` are the findings of `inercal.systems.imu.sections.checks`."""
     sections = counted(len(found.problem.readings.sections), "section")
     if before:
         return Status.INCONSISTENT, before[0].message
@@ -162,9 +162,9 @@ def _placing(found: SectionCalibration) -> Iterator[Finding]:
             and not section.setup
             and section.axis_u != 0.0
         ):
-            axis = side(section.axis).lstrip("+-")
+            axis = direction(section.axis)[1]
             alone[axis] = alone.get(axis, 0) + 1
-    axes = sorted(axis for axis, count in alone.items() if axis and count > 1)
+    axes = sorted(axis for axis, count in alone.items() if count > 1)
     if axes:
         yield Finding(
             "one_setup",

@@ -51,15 +51,22 @@ def verticals(problem: Problem, point: Iterate, common: Values, local: Values) -
     return _directions(problem, point, common, local)[0]
 
 
-def _directions(problem: Problem, point: Iterate, common: Values, local: Values) -> tuple[Values, Values]:
-    """Directions (..., n, 3) of specific force and of axes."""
+def _directions(
+    problem: Problem, point: Iterate, common: Values, local: Values
+) -> tuple[Values, Values, Values]:
+    """Directions (..., n, 3) of specific force and of axes, and the level part of earth rate that is known."""
     tilt = (across(point.up) @ local[..., TILT, None])[..., 0]
     swivel = (across(point.axis) @ local[..., SWIVEL, None])[..., 0]
     mounting = np.broadcast_to(common[..., None, MOUNTING], tilt.shape)
-    up = turned(tilt, np.broadcast_to(point.up, tilt.shape))
-    up = np.where(problem.readings.tied[:, None], turned(swivel, up), up)
-    axis = turned(swivel, np.broadcast_to(point.axis, swivel.shape))
-    return turned(mounting, up), turned(mounting, axis)
+    tied = problem.readings.tied[:, None]
+
+    def tilted(v: Array) -> Values:
+        once = turned(tilt, np.broadcast_to(v, tilt.shape))
+        return turned(mounting, np.where(tied, turned(swivel, once), once) if tied.any() else once)
+
+    axis = turned(mounting, turned(swivel, np.broadcast_to(point.axis, swivel.shape)))
+    north = tilted(problem.north) if problem.north.any() else problem.north
+    return tilted(point.up), axis, north
 
 
 def effective(problem: Problem, x: Array) -> Array:
@@ -87,12 +94,12 @@ def outputs(problem: Problem, point: Iterate, common: Values, local: Values, bia
     """Mean outputs (..., n, 3 kinds, 3 axes), by common unknowns (..., 43), those of sections (..., n, 8) and biases of
     their sessions (n, 2, 3)."""
     r = problem.readings
-    up, axis = _directions(problem, point, common, local)
+    up, axis, north = _directions(problem, point, common, local)
     whole = common[..., None, :]
     size = np.where(r.forced, r.force, whole[..., GRAVITY]) * (1.0 - point.short[:, 0]) * r.has_force
     force = size[..., None] * up
     vertical = np.where(r.forced, 0.0, whole[..., EARTH_UP] * r.has_force)
-    earth = vertical[..., None] * up + problem.north + (point.level @ local[..., EARTH, None])[..., 0]
+    earth = vertical[..., None] * up + north + (point.level @ local[..., EARTH, None])[..., 0]
     mean_force, mean_earth = (_over_turn(v, axis, r.swung[:, :1], r.swung[:, 1:]) for v in (force, earth))
     rate = (r.rate + local[..., RATE]) * np.where(r.turning, 1.0 + whole[..., CLOCK], 1.0)
     rate = rate + np.where((r.rate != 0.0) & ~r.know_axis & ~r.tied, whole[..., EARTH_ALONG], 0.0)
@@ -159,6 +166,9 @@ def _means(problem: Problem, point: Iterate) -> RowBlock:
     variance = r.variance.copy()
     g = problem.priors.site.gravity
     variance[:, :2] += (point.loss[:, :1] * (g * point.up * x[K1]) ** 2)[:, None]
+    # what g-sensitivity adds where specific force is not known at all, but known elsewhere
+    unfelt = (problem.sd[G].reshape(3, 3).max(axis=1) * g * x[S]) ** 2
+    variance[:, 2] += np.where(r.has_force[:, None], 0.0, unfelt)
     variance[:, 2] += point.loss[:, 1:] * (r.rate[:, None] * point.axis * x[S]) ** 2
     return RowBlock(
         misfit(problem, point).reshape(n, 9),

@@ -14,7 +14,7 @@ from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.problem import Iterate, Problem
 from inercal.systems.imu.sections.unknowns import RATE
 
-_ROUNDS: Final = 60
+_ROUNDS: Final = 40
 _TRIALS: Final = 12
 _LARGEST_TILT: Final = 0.7
 """Tilt [rad] in a step at most, within what `turned` takes."""

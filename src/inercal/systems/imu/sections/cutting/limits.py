@@ -15,6 +15,9 @@ class Limits:
     still_window: float = 0.4
     """Length [s] of the windows whose variance tells rest from motion."""
 
+    blocks_of_window: int = 4
+    """Blocks of a window: windows begin at every block."""
+
     shortest_hold: float = 0.65
     """Shortest hold [s] that is read."""
 
@@ -55,8 +58,47 @@ class Limits:
     turning_hold: float = 10.0
     """Distance of the gyro's mean in a hold from that of the others, over their scatter, from which it turns."""
 
+    turning_rest: float = 30.0
+    """The same of a rest that a name or a row states."""
+
     holds_to_compare: int = 5
     """Holds without which the means of the gyro are not compared."""
+
+    sides_to_compare: int = 4
+    """Rests of known direction without which where they stand is not judged."""
+
+    rate_miss: float = 0.2
+    """Part by which the gyro's reading of a rate or turn may differ from what is stated."""
+
+    shortest_rate: float = 1.0
+    """Shortest stretch [s] at a steady rate that is found in a log."""
+
+    steady_rate: float = 0.02
+    """Change of a rate from the first to the last third of a stretch, as a part of it, up to which it is steady."""
+
+    one_rate: float = 0.05
+    """Difference of two rates, as a part of them, below which they are one."""
+
+    turn_about_axis: float = 0.95
+    """Part of a rotation that is about one axis of the case, from which it may be a turn about it."""
+
+    turned_vertical: float = 0.35
+    """Change of specific force over a rotation, as a part of gravity, up to which it may be a turn about an axis."""
+
+    least_turn: float = 0.2
+    """Rotation, as a part of the largest between two holds, from which it may be a turn."""
+
+    whole_turn: float = 0.1
+    """Part by which the gyro's reading may miss whole turns that are taken for granted."""
+
+    cut_of_rest: float = 0.02
+    """Part of a file of one rest that may be moving without its times being written down."""
+
+    largest_bias: float = math.radians(20.0)
+    """Output of a gyro [rad/s] up to which it may be its bias; a steady one beyond is a rate."""
+
+    known_gravity: float = 0.01
+    """Difference of a stated size from that of gravity, as a part of it, up to which it is a direction alone."""
 
     noise_dof: float = 8.0
     """Degrees of freedom without which means of a length do not tell the noise."""
@@ -91,8 +133,8 @@ class Limits:
     fewest_dof: float = 4.0
     """Degrees of freedom by which u is told from U at least: of four U is 1.96 times the standard deviation."""
 
-    misplaced: float = math.radians(45.0)
-    """Angle [rad] from its name beyond which a section is not what its name says."""
+    suspect_section: float = 0.05
+    """Probability of a section's distance from all others below which scatter is found without it."""
 
     large_placing: float = math.radians(10.0)
     """Placing [rad] that is named."""

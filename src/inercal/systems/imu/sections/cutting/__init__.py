@@ -1,0 +1,1 @@
+"""Sections found in recordings, and what names and tables say of them."""

@@ -1,0 +1,392 @@
+"""Holds of a recording: where the instrument stands still, for accelerometers and for gyros each by their own evidence.
+
+The variance in windows of 0.4 s has two humps on a logarithmic scale, of rest and of motion; still is what lies below
+the valley between them. Of several valleys (table, hand, motion) the one is taken that gives most poses in sound holds.
+Each hold is grown to where it stops being still, and judged: by the drift of its outputs, and by the mean of the gyro
+against that of the others, for a smooth turn about the vertical leaves the accelerometers as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inercal.foundation.arrays import Array
+from inercal.foundation.records.dwells import Dwell, breaks, static_intervals
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+
+Bools = NDArray[np.bool_]
+Places = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class UnusedHold:
+    """A stretch, samples ``start`` to ``stop`` (exclusive), that looks like a hold, and why it is none."""
+
+    start: int
+    stop: int
+    why: str
+
+
+@dataclass(frozen=True)
+class Holds:
+    """Holds in which the accelerometers, and in which the gyros may be read, stretches of neither, the calmest row."""
+
+    acc: tuple[Dwell, ...]
+    gyro: tuple[Dwell, ...]
+    unused: tuple[UnusedHold, ...]
+    calmest: int = 0
+
+
+def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
+    """Find the holds of a recording.
+
+    Parameters
+    ----------
+    t : (n,)
+        Time [s] of the rows.
+    acc, gyro : (n, 3) or None
+        Outputs in any unit; None: not there. Rows that are not finite are never still.
+    """
+    block = _block(t)
+    if len(t) < (LIMITS.blocks_of_window + 1) * block:
+        return Holds((), (), ())
+    cuts, step = _cuts(t), _step(t)
+    shortest = max(LIMITS.blocks_of_window, int(LIMITS.shortest_hold / (block * step)) - 1)
+    turning = None if gyro is None else _Windows.of(gyro, block, cuts)
+    unrest = None if turning is None else turning.unrest()
+    gates = [] if unrest is None else _valleys(unrest[0] + unrest[1])
+    harmless = 0.0
+    held: list[Dwell] = []
+    resting: list[Dwell] = []
+    if acc is not None:
+        windows = _Windows.of(acc, block, cuts)
+        slow = np.zeros(len(windows.variance)) if unrest is None else unrest[1]
+        cap = (LIMITS.restless_hold * windows.gravity) ** 2
+        harmless = _harmless(windows, slow, block * step)
+        sets = [
+            (gate, windows.stretches((windows.variance < level) & (slow < gate), shortest))
+            for level in windows.levels(cap)
+            for gate in sorted({*(max(gate, harmless) for gate in gates), np.inf})
+        ]
+        held = max(sets, key=lambda one: _worth(one[0], *windows.poses(one[1])))[1]
+    if turning is not None and unrest is not None:
+        rests = [turning.stretches(unrest[0] + unrest[1] < gate, shortest) for gate in gates or [np.inf]]
+        resting = max(rests, key=len)
+    kept, unused = [], []
+    if acc is not None:
+        triads = [(acc, 0.0)] if gyro is None else [(acc, 0.0), (gyro, harmless)]
+        grown = _grown(triads, held, block, cuts)
+        sound, unsound = _judged(t, grown, acc, gyro, windows.gravity, block)
+        kept.append(sound)
+        unused += unsound
+    if gyro is not None:
+        sound, unsound = _judged(t, _grown([(gyro, 0.0)], resting, block, cuts), None, gyro, 0.0, block)
+        kept.append(sound)
+        unused += unsound if acc is None else []
+    calm = windows if acc is not None else turning
+    return Holds(
+        kept[0] if acc is not None else (),
+        kept[-1] if gyro is not None else (),
+        tuple(unused),
+        0 if calm is None else int(np.argmin(calm.variance)) * block,
+    )
+
+
+def steady_rates(t: Array, gyro: Array) -> tuple[Dwell, ...]:
+    """Stretches in which a gyro (n, 3) turns steadily: calm, off its output at rest, and without a drift."""
+    block = _block(t)
+    if len(t) < (LIMITS.blocks_of_window + 1) * block:
+        return ()
+    cuts = _cuts(t)
+    windows = _Windows.of(gyro, block, cuts)
+    variance, turning = windows.unrest()
+    calm, moving = _valleys(variance), _valleys(variance + turning)
+    if not moving:
+        return ()
+    still = (variance < (calm or moving)[0]) & (turning > moving[0])
+    found = _grown(
+        [(gyro, 0.0)], windows.stretches(still, int(LIMITS.shortest_rate / _step(t) / block)), block, cuts
+    )
+    rest = windows.middle + windows.at_rest()
+    steady = []
+    for hold in found:
+        third = hold.samples // 3
+        first, last = hold.of(gyro)[:third].mean(axis=0), hold.of(gyro)[-third:].mean(axis=0)
+        if np.linalg.norm(last - first) < LIMITS.steady_rate * np.linalg.norm(0.5 * (first + last) - rest):
+            steady.append(hold)
+    return tuple(steady)
+
+
+def _step(t: Array) -> float:
+    """Median interval [s] of times (n,) that increase; 0 where none does."""
+    steps = np.diff(t)
+    return float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+
+
+def _block(t: Array) -> int:
+    """Rows of a block."""
+    step = _step(t)
+    return max(round(LIMITS.still_window / LIMITS.blocks_of_window / step), 2) if step else len(t)
+
+
+def _cuts(t: Array) -> Places:
+    """Rows before which time breaks."""
+    return breaks(t, 0.5 * LIMITS.still_window + 3.0 * _step(t))
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Windows of a triad: variances (m,) summed over axes, infinite where a row is missing or time breaks.
+
+    Means (m, 3) of windows and (m + 3, 3) of ``blocks`` are less the mean ``middle`` (3,) of the recording; ``breaks``
+    are blocks before which time breaks.
+    """
+
+    variance: Array
+    means: Array
+    blocks: Array
+    middle: Array
+    breaks: Places
+
+    @staticmethod
+    def of(x: Array, block: int, cuts: Places) -> _Windows:
+        """The windows of outputs (n, 3), in blocks of so many rows."""
+        count = len(x) // block
+        finite = x[np.isfinite(x).all(axis=1)]
+        middle = np.asarray(finite.mean(axis=0) if len(finite) else np.zeros(x.shape[1]))
+        rows = (x[: count * block] - middle).reshape(count, block, -1)
+        sums, squares = rows.sum(axis=1), np.einsum("ijk,ijk->i", rows, rows)
+        total, power = (_sums_of_windows(values) for values in (sums, squares))
+        size = LIMITS.blocks_of_window * block
+        variance = np.maximum(power - (total**2).sum(axis=1) / size, 0.0) / (size - 1)
+        begins = np.arange(len(variance)) * block
+        inside = np.searchsorted(cuts, begins + size) > np.searchsorted(cuts, begins, side="right")
+        variance[inside | ~np.isfinite(variance)] = np.inf
+        return _Windows(variance, total / size, sums / block, middle, cuts[cuts % block == 0] // block)
+
+    @property
+    def gravity(self) -> float:
+        """Size of gravity [output]: half the largest range of an axis, or the mean output where it hardly turns."""
+        known = np.isfinite(self.variance)
+        if not known.any():
+            return 0.0
+        calm = self.means[self.variance <= np.median(self.variance[known])]
+        half, whole = (
+            0.5 * float(np.max(np.ptp(calm, axis=0))),
+            float(np.linalg.norm(self.middle + calm.mean(axis=0))),
+        )
+        return half if half > LIMITS.drift_in_hold * whole else whole
+
+    def levels(self, cap: float) -> list[float]:
+        """Variances below which windows may be still: the valleys below ``cap``; of one hump that all are, or none."""
+        valleys = [level for level in _valleys(self.variance) if level < cap]
+        return valleys or [cap if np.mean(self.variance < cap) > 0.5 else 0.0]
+
+    def unrest(self) -> tuple[Array, Array]:
+        """Variances (m,) of a gyro's windows, and squares (m,) of their means' distance from that at rest."""
+        return self.variance, ((self.means - self.at_rest()) ** 2).sum(axis=1)
+
+    def at_rest(self) -> Array:
+        """Mean output (3,) at rest: of the calm windows, that to which the instrument comes back most often."""
+        known = self.variance[np.isfinite(self.variance)]
+        if not len(known):
+            return np.zeros(self.means.shape[1])
+        valleys = _valleys(self.variance)
+        calm = np.flatnonzero(self.variance <= (valleys[0] if valleys else np.median(known)))
+        calm = calm[:: max(len(calm) // 600, 1)]
+        means = self.means[calm]
+        reach = 9.0 * float(np.median(self.variance[calm])) / len(self.means[0])
+        near = ((means[:, None] - means[None]) ** 2).sum(axis=2) <= max(reach, np.finfo(float).tiny)
+        visits = (near & ~np.roll(near, 1, axis=1)).sum(axis=1)
+        best = int(np.lexsort((near.sum(axis=1), np.minimum(visits, 1000)))[-1])
+        return np.asarray(means[near[best]].mean(axis=0))
+
+    def stretches(self, still: Bools, shortest: int) -> list[Dwell]:
+        """Runs of blocks, at least so many, that lie in windows which are still (m,)."""
+        inside = np.zeros(len(self.blocks), dtype=bool)
+        for k in range(LIMITS.blocks_of_window):
+            inside[k : k + len(still)] |= still
+        return list(static_intervals(inside, self.breaks, shortest))
+
+    def poses(self, stretches: Sequence[Dwell]) -> tuple[int, int]:
+        """Poses in stretches of blocks that do not drift, and the number of blocks in them."""
+        if not stretches:
+            return 0, 0
+        sums = np.concatenate(
+            [np.zeros((1, self.blocks.shape[1])), np.cumsum(np.nan_to_num(self.blocks), axis=0)]
+        )
+        starts, stops = (np.array([getattr(one, end) for one in stretches]) for end in ("start", "stop"))
+        third = np.maximum((stops - starts) // 3, 1)
+        first, last = (
+            (sums[starts + third] - sums[starts]) / third[:, None],
+            (sums[stops] - sums[stops - third]) / third[:, None],
+        )
+        steps = np.nan_to_num(np.sum(np.diff(self.blocks, axis=0) ** 2, axis=1))
+        power = np.concatenate([[0.0], np.cumsum(steps)])
+        noise = (power[stops - 1] - power[starts]) / (stops - starts - 1) / third
+        limit = np.maximum((LIMITS.drift_in_hold * self.gravity) ** 2, LIMITS.drift_sigmas**2 * noise)
+        sound = ((last - first) ** 2).sum(axis=1) <= limit
+        means = ((sums[stops] - sums[starts]) / (stops - starts)[:, None])[sound]
+        moved = np.linalg.norm(np.diff(means, axis=0), axis=1) > LIMITS.same_pose * self.gravity
+        return int(sound.any()) + int(moved.sum()), int((stops - starts)[sound].sum())
+
+
+def _worth(gate: float, poses: int, blocks: int) -> tuple[int, float, int]:
+    """Order among sets of holds: most poses first, then the least turning that gives them, then the most time."""
+    return poses, -gate, blocks
+
+
+def _sums_of_windows(values: Array) -> Array:
+    """Sums over each window of its blocks' values (k, ...)."""
+    stop = len(values) - LIMITS.blocks_of_window + 1
+    return np.asarray(sum(values[k : stop + k] for k in range(LIMITS.blocks_of_window)))
+
+
+def _valleys(sizes: Array) -> list[float]:
+    """Sizes at the valleys between humps of the logarithm of ``sizes`` (m,), ascending."""
+    known = np.log10(sizes[np.isfinite(sizes) & (sizes > 0.0)])
+    if len(known) < 2 * LIMITS.hump_windows:
+        return []
+    width = 0.05
+    counts, edges = np.histogram(known, bins=np.arange(known.min() - 1.0, known.max() + 1.0, width))
+    places = np.arange(-8, 9)
+    kernel = np.exp(-0.5 * (places / 3.0) ** 2)
+    smooth = np.convolve(counts, kernel / kernel.max(), mode="same")
+    found: list[tuple[int, int]] = []  # ends of the valleys: where the smoothed counts are lowest
+    top, low, begin, end = 0.0, np.inf, 0, 0
+    for k, height in enumerate(smooth):
+        if height < low - 1e-9:
+            low, begin, end = height, k, k
+        elif height <= low + 1e-9:
+            end = k
+        hump = min(top, height)
+        if hump >= LIMITS.hump_windows and low <= LIMITS.valley_depth * hump:
+            found.append((begin, end))
+            top, low = height, height
+        if height > top:
+            top, low = height, height
+    return [float(10.0 ** (0.5 * (edges[a] + edges[b] + width))) for a, b in found]
+
+
+def _harmless(windows: _Windows, turning: Array, time: float) -> float:
+    """Square [output^2] of a rate that does no harm to the mean of accelerometers, in the gyro's output.
+
+    The scale of a gyro in counts is told by how fast the vertical turns where the gyro does: ``turning`` (m,) are
+    squares of its mean output in windows that begin every ``time`` [s]. 0 where it never does.
+    """
+    lag = 2 * LIMITS.blocks_of_window
+    change = np.linalg.norm(windows.means[lag:] - windows.means[:-lag], axis=1)
+    rate = change / windows.gravity / (lag * time)
+    output = np.sqrt(turning[lag // 2 : -lag // 2])
+    told = (
+        (rate > LIMITS.slowest_telling)
+        & (rate < LIMITS.fastest_telling)
+        & np.isfinite(output)
+        & (output > 0.0)
+    )
+    if np.count_nonzero(told) < 2 * LIMITS.blocks_of_window:
+        return 0.0
+    return float((LIMITS.harmless_rate * np.median(output[told] / rate[told])) ** 2)
+
+
+def _grown(
+    triads: Sequence[tuple[Array, float]], stretches: Sequence[Dwell], block: int, cuts: Places
+) -> list[Dwell]:
+    """Stretches of blocks as samples, each grown or cut to where a triad (n, 3) stops being as still as inside.
+
+    With each triad stands the square of a change that does no harm.
+    """
+    n = len(triads[0][0])
+    grown: list[Dwell] = []
+    for k, stretch in enumerate(stretches):
+        start, stop = stretch.start * block, stretch.stop * block
+        reach = (LIMITS.blocks_of_window + 1) * block
+        low = max(start - reach, grown[-1].stop if grown else 0, int(max(cuts[cuts <= start], default=0)))
+        after = stretches[k + 1].start * block if k + 1 < len(stretches) else n
+        high = min(stop + reach, after, int(min(cuts[cuts >= stop], default=n)))
+        first, last = low, high
+        for x, harmless in triads:
+            begin, end = still_edges(x[low:high], start - low, stop - low, block, harmless)
+            first, last = max(first, low + begin), min(last, low + end)
+        if last - first > block:
+            grown.append(Dwell(first, last))
+    return grown
+
+
+def still_edges(x: Array, start: int, stop: int, block: int, harmless: float) -> tuple[int, int]:
+    """The first and the last sample (exclusive) about ``start`` and ``stop`` up to which rows (n, 3) are as inside.
+
+    Told by means over a block and by mean squares about the mean, in blocks that begin at every row.
+    """
+    core = slice(start + block, stop - 2 * block + 1)
+    middle = x[start + block : stop - block].mean(axis=0)
+    sums = np.cumsum(np.concatenate([np.zeros((1, x.shape[1])), x - middle]), axis=0)
+    means = (sums[block:] - sums[:-block]) / block
+    power = np.cumsum(np.concatenate([[0.0], ((x - middle) ** 2).sum(axis=1)]))
+    power = (power[block:] - power[:-block]) / block
+    shift = (means**2).sum(axis=1)
+    least = max(harmless, 1e-30)
+    off = ~(shift <= max(LIMITS.hold_edge**2 * shift[core].mean(), least)) | ~(
+        power <= max(LIMITS.hold_edge_power * power[core].mean(), least)
+    )
+    before, after = np.flatnonzero(off[: core.start]), np.flatnonzero(off[core.stop :])
+    # the outermost row of the last block that is off is the first of the motion; a slow one began before
+    margin = 1 + block // 5
+    begin = int(before[-1]) + margin if len(before) else 0
+    end = core.stop + int(after[0]) + block - margin if len(after) else len(x)
+    return begin, end
+
+
+def _judged(
+    t: Array, holds: Sequence[Dwell], acc: Array | None, gyro: Array | None, gravity: float, block: int
+) -> tuple[tuple[Dwell, ...], list[UnusedHold]]:
+    """The sound ones among holds, and the others with the reason."""
+    why = {hold: reason for hold in holds if (reason := _too_short(t, hold))}
+    if acc is not None:
+        why |= {
+            hold: reason
+            for hold in holds
+            if hold not in why and (reason := _drifting(hold.of(acc), gravity, block))
+        }
+    left = [hold for hold in holds if hold not in why]
+    if gyro is not None and len(left) >= LIMITS.holds_to_compare:
+        means = np.array([hold.of(gyro).mean(axis=0) for hold in left])
+        off = np.linalg.norm(means - np.median(means, axis=0), axis=1)
+        noise = np.sqrt(np.median([hold.of(gyro).var(axis=0).sum() for hold in left]))
+        limit = max(LIMITS.turning_hold * float(np.median(off)), float(noise))
+        for hold, size in zip(left, off, strict=True):
+            if size > limit:
+                why[hold] = (
+                    f"the gyro turns: its mean is {size / float(np.median(off)):.0f} times as far off as usual"
+                )
+    return (
+        tuple(hold for hold in holds if hold not in why),
+        [UnusedHold(hold.start, hold.stop, reason) for hold, reason in why.items()],
+    )
+
+
+def _too_short(t: Array, hold: Dwell) -> str:
+    """A reason in words, empty if there is none."""
+    length = float(t[hold.stop - 1] - t[hold.start]) * hold.samples / (hold.samples - 1)
+    return (
+        ""
+        if length >= LIMITS.shortest_hold
+        else f"lasts {length:.2f} s, less than {LIMITS.shortest_hold:g} s"
+    )
+
+
+def _drifting(x: Array, gravity: float, block: int) -> str:
+    """A reason in words, empty if rows (n, 3) of one hold do not drift."""
+    third = len(x) // 3
+    count = third // block
+    change = x[-third:].mean(axis=0) - x[:third].mean(axis=0)
+    means = x[: len(x) // block * block].reshape(-1, block, x.shape[1]).mean(axis=1)
+    noise = float((np.diff(means, axis=0) ** 2).sum(axis=1).mean()) / max(count, 1) if len(means) > 1 else 0.0
+    size = float(np.linalg.norm(change))
+    if size <= max(LIMITS.drift_in_hold * gravity, LIMITS.drift_sigmas * float(np.sqrt(noise))):
+        return ""
+    return f"specific force drifts in it by {100.0 * size / gravity:.1f} % of gravity"

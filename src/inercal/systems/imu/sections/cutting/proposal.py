@@ -1,0 +1,224 @@
+"""From recordings to sections: what names, labels and the data themselves say, and what has to be asked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from inercal.foundation.errors import RecordError
+from inercal.foundation.findings import Finding
+from inercal.foundation.records.checks.values import at_ends
+from inercal.foundation.records.record import Record
+from inercal.foundation.units import RAW
+from inercal.systems.imu.rows import is_counted
+from inercal.systems.imu.sections.cutting.checks import contradictions
+from inercal.systems.imu.sections.cutting.cut import Stretch, TriadSamples, cut
+from inercal.systems.imu.sections.cutting.holds import holds_of, steady_rates
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+from inercal.systems.imu.sections.cutting.log import on_clock, rows_of_log
+from inercal.systems.imu.sections.cutting.means import Means, rows_of_means, sections_of_means
+from inercal.systems.imu.sections.cutting.table import SectionRow, direction_of, quantity_of
+from inercal.systems.imu.sections.cutting.words import Claim, claim
+from inercal.systems.imu.sections.section import Section
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Rows of ``sections.csv``, the sections that they give, those of no use with the reason, and what is asked."""
+
+    rows: tuple[SectionRow, ...]
+    sections: tuple[Section, ...]
+    unused: dict[str, str]
+    questions: tuple[Finding, ...]
+
+    @staticmethod
+    def of(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Proposal:
+        """Sections of recordings, given by the names of their files, and questions about them.
+
+        Labels of a recording tell its sections, else its name, else what is found in it: rests, steady rates, turns.
+        Rows without times are means of poses; ``means`` gives those whose directions or scatter are known.
+
+        Raises
+        ------
+        RecordError
+            A recording has neither accelerometers nor gyros.
+        """
+        means = means or {}
+        files = [_recorded(name, record) for name, record in records.items()]
+        tables = {
+            file.name: Means(_values(file.acc), _values(file.gyro))
+            for file in files
+            if is_counted(file.record)
+        } | dict(means)
+        told: list[SectionRow] = []
+        questions: list[Finding] = []
+        for file in files:
+            if file.name in tables:
+                told += rows_of_means(file.name, tables[file.name])
+            else:
+                found, asked = _rows(file)
+                told += found
+                questions += asked
+        rows = _named_apart(told, several=len(files) > 1)
+        sections: list[Section] = []
+        for name, table in tables.items():
+            sections += sections_of_means([row for row in rows if row.file == name], table)
+        recorded = {file.name: (file.acc, file.gyro) for file in files if file.name not in tables}
+        done = cut(stretches_of(rows, recorded))
+        sections += done.sections
+        scales = {_scale(file.record) for file in files if file.gyro is not None}
+        scale = scales.pop() if len(scales) == 1 else None
+        return Proposal(
+            tuple(rows), tuple(sections), done.unused, (*questions, *contradictions(sections, scale))
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Recorded:
+    """A recording by name, with its triads."""
+
+    name: str
+    record: Record
+    acc: TriadSamples | None
+    gyro: TriadSamples | None
+
+
+def stretches_of(
+    rows: Sequence[SectionRow], files: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]]
+) -> list[Stretch]:
+    """The stretches that rows are of, in recordings given as accelerometers and gyros by name.
+
+    A row that names no file is of the only one. Rows of other files are left out: they are not of samples.
+    """
+    only = next(iter(files)) if len(files) == 1 else ""
+    return [
+        Stretch(
+            row,
+            *(None if one is None else one.between(row.begin, row.end) for one in files[row.file or only]),
+        )
+        for row in rows
+        if (row.file or only) in files
+    ]
+
+
+def _rows(file: _Recorded) -> tuple[list[SectionRow], list[Finding]]:
+    """Rows of a recording by its labels, its name, or what is found in it."""
+    clock = file.acc or file.gyro
+    assert clock is not None
+    if file.record.labels and len(file.record.labels) == len(clock.t):
+        rows = _labelled(file, clock)
+        if rows:
+            return rows, []
+    said = claim(file.name)
+    if not said.kind:
+        return rows_of_log(file.name, file.acc, file.gyro, _scale(file.record))
+    name = PurePosixPath(file.name.replace("\\", "/")).stem
+    row = _of_claim(said, name, file.name, "name")
+    asked = [] if row.kind != "turn" or row.angle is not None else [_which_angle(row)]
+    if row.kind == "rest":
+        return _held(file, clock, row)
+    return [_at_its_rate(file, row) if row.kind == "rate" else row], asked
+
+
+def _at_its_rate(file: _Recorded, row: SectionRow) -> SectionRow:
+    """A file that holds one rate by its name: its longest stretch at a steady rate, where it has others as well."""
+    steady = () if file.gyro is None else steady_rates(file.gyro.t, file.gyro.values)
+    if file.gyro is None or not steady:
+        return row
+    longest, t = max(steady, key=lambda hold: hold.samples), file.gyro.t
+    return replace(row, begin=float(t[longest.start]), end=float(t[longest.stop - 1]))
+
+
+def _held(file: _Recorded, clock: TriadSamples, row: SectionRow) -> tuple[list[SectionRow], list[Finding]]:
+    """A file that holds one rest by its name: its longest hold; a finding where there is none."""
+    gyro = None if file.gyro is None else on_clock(file.gyro, clock.t)
+    found = holds_of(clock.t, None if file.acc is None else file.acc.values, gyro)
+    holds = found.acc if file.acc is not None else found.gyro
+    if not holds:
+        why = found.unused[0].why if found.unused else f"it is never still for {LIMITS.shortest_hold:g} s"
+        headline = f"{row.section} is not held still: {why}."
+        return [], [Finding("not_at_rest", headline, file.name, action="Record this side again, at rest.")]
+    longest = max(holds, key=lambda hold: hold.samples)
+    begin, end = float(clock.t[longest.start]), float(clock.t[longest.stop - 1])
+    whole = longest.samples > (1.0 - LIMITS.cut_of_rest) * len(clock.t)
+    return [row if whole else replace(row, begin=begin, end=end)], []
+
+
+def _labelled(file: _Recorded, clock: TriadSamples) -> list[SectionRow]:
+    """A row for each run of one label that says something; labels that say nothing are none."""
+    labels = np.array(file.record.labels)
+    starts = [0, *(np.flatnonzero(labels[1:] != labels[:-1]) + 1).tolist()]
+    rows = []
+    for start, stop in zip(starts, [*starts[1:], len(labels)], strict=True):
+        said, t = claim(str(labels[start])), clock.t[start:stop]
+        if said.kind and np.isfinite(t).any():
+            row = _of_claim(said, str(labels[start]), file.name, "label")
+            rows.append(replace(row, begin=float(np.nanmin(t)), end=float(np.nanmax(t))))
+    return rows
+
+
+def _of_claim(said: Claim, name: str, file: str, why: str) -> SectionRow:
+    """The row that a name makes."""
+    return SectionRow(
+        name, file, kind=said.kind or "rest",
+        up=direction_of(said.up, name) if said.up else None,
+        axis=direction_of(said.axis, name) if said.axis else None,
+        rate=None if said.rate is None else quantity_of(said.rate, 0.0, "deg/s"),
+        angle=None if said.angle is None else quantity_of(said.angle, 0.0, "deg"),
+        why=why if said.kind != "turn" or said.angle is not None else f"{why}: which angle?",
+    )  # fmt: skip
+
+
+def _which_angle(row: SectionRow) -> Finding:
+    """The question after the angle of a turn."""
+    return Finding(
+        "not_stated",
+        f"{row.section} is a turn of an angle that nobody stated.",
+        row.file,
+        action="Write it into the column `angle` of sections.csv, with its sign.",
+    )
+
+
+def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
+    """The rows, names that are there twice with the file, and numbered where that does not tell them apart."""
+    named: list[SectionRow] = []
+    taken: dict[str, int] = {}
+    names = [row.section for row in rows]
+    for row in rows:
+        stem = PurePosixPath(row.file.replace("\\", "/")).stem
+        name = f"{stem}: {row.section}" if several and names.count(row.section) > 1 else row.section
+        taken[name] = taken.get(name, 0) + 1
+        named.append(replace(row, section=name if taken[name] == 1 else f"{name} {taken[name]}"))
+    return named
+
+
+def _recorded(name: str, record: Record) -> _Recorded:
+    """A recording with its triads; raises `RecordError` where it has none."""
+    acc, gyro = _samples(record, "acc"), _samples(record, "gyro")
+    if acc is None and gyro is None:
+        raise RecordError(name, "found neither three accelerometers nor three gyros, expected one of the two")
+    return _Recorded(name, record, acc, gyro)
+
+
+def _samples(record: Record, sensor: str) -> TriadSamples | None:
+    """A triad of a record; None where it is not whole."""
+    if all(f"{sensor}_{axis}" in record for axis in "xyz"):
+        triad = record.triad(sensor)
+        clipped = np.any([at_ends(values) for values in triad.values.T], axis=0)
+        return TriadSamples(triad.t, triad.values, np.asarray(clipped))
+    return None
+
+
+def _values(samples: TriadSamples | None) -> np.ndarray | None:
+    """The outputs (n, 3) of a triad."""
+    return None if samples is None else samples.values
+
+
+def _scale(record: Record) -> float | None:
+    """Output of a sound gyro per rad/s; None in counts, or without one."""
+    if "gyro_x" not in record or record["gyro_x"].unit.dimension in RAW:
+        return None
+    return 1.0 / record["gyro_x"].unit.factor

@@ -1,0 +1,59 @@
+"""U of a calibration from sections holds the truth in 95 % of the cases, by an independent simulation."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+from section_protocols import PROTOCOLS
+
+from inercal.systems.imu.sections.calibration import calibrate_sections
+
+SEED = 45
+#: protocols that err on the safe side, since hardly anything but what is usual tells of noise or placing
+SAFE = {"six sides, nothing stated", "rates alone, placing not stated", "rates of known size", "twelve poses"}
+
+
+def runs_of(name, count):
+    """Coverage of each run, and its error squared over covariance per coefficient; K2 is by prior and left aside."""
+    inside, squares, protocol = [], [], PROTOCOLS[name]
+    for run in range(count):
+        unit, sections, priors = protocol.run([SEED, run])
+        found = calibrate_sections(sections, priors)
+        assert found.converged
+        used = [k for k, each in enumerate(found.names) if not each.startswith("K2") and protocol.keep(each)]
+        error = np.array([found.x[k] - unit.truth[found.names[k]] for k in used])
+        inside.append(np.mean(np.abs(error) < found.U[used]))
+        squares.append(error @ np.linalg.solve(found.covariance[np.ix_(used, used)], error) / len(used))
+    return np.array(inside), np.array(squares)
+
+
+def least(inside, wanted, risk):
+    """Whether the mean over runs may be that of a coverage of at least ``wanted``: coefficients of one run depend on
+    each other, so that the scatter of the runs tells how sure their mean is."""
+    return inside.mean() > wanted + norm.ppf(risk) * max(inside.std(ddof=1), 0.03) / np.sqrt(len(inside))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "six sides, accelerometers",
+        "sides and turns both ways, placing not stated",
+        "rates about sides",
+        "four sessions",
+    ],
+)
+def test_expanded_uncertainty_holds_the_truth(name):
+    inside, squares = runs_of(name, 20)
+    assert least(inside, 0.94, 1e-3)
+    assert inside.mean() < 0.999
+    assert np.median(squares) < 2.0
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_expanded_uncertainty_holds_the_truth_of_every_protocol(name):
+    inside, squares = runs_of(name, 100)
+    assert least(inside, 0.93, 1e-3)
+    if name not in SAFE:
+        assert inside.mean() < 0.985
+        assert 0.5 < np.median(squares) < 1.3
