@@ -65,13 +65,14 @@ def turned_by_hand(
     drift=0.0,
     walk=0.0,
     swing=0.5,
+    level=False,
 ):
     """A record of a unit in the hand. ``turns`` (rests - 1, 3) are rotation vectors of the moves; drawn if absent.
     ``drift`` [rad/s] is what the biases of the gyro gain over the record, ``walk`` [rad/s] a slow error of its rate in
-    moves."""
+    moves, ``swing`` [rad] how far their axes swing; ``level``: it begins upright."""
     v = rng.normal(0, 1.2, (rests - 1, 3)) if turns is None else np.asarray(turns)
     aside = rng.normal(0, swing, v.shape)
-    attitude = [Rotation.from_rotvec(rng.normal(0, 2, 3))]
+    attitude = [Rotation.identity() if level else Rotation.from_rotvec(rng.normal(0, 2, 3))]
     for turn in v:
         attitude.append(attitude[-1] * Rotation.from_rotvec(turn))
     period, hold = rest + move, rest
