@@ -134,6 +134,9 @@ class Limits:
     held_scatter: float = 0.05
     """Standard deviation of the logarithm of a scatter that moves must not change."""
 
+    outlying_risk: float = 3e-3
+    """Accepted probability that any sound section or move of a recording is named as off the others."""
+
 
 LIMITS = Limits()
 """The limits in force."""
