@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from inercal.systems.imu.sections.checks import contradictions
 from section_protocols import PLACED, WHOLE, poses, rates, sides, site, turns
 from turned_units import DEG, Bench, Unit
 
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.sections.calibration import calibrate_sections
+from inercal.systems.imu.sections.cutting.checks import contradictions
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.priors import Priors

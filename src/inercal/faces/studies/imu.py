@@ -52,6 +52,7 @@ from inercal.systems.imu.settings import (
     KnownTurnsSettings,
     MeansSettings,
     Method,
+    SectionsSettings,
     Simulation,
     mounting_of,
 )
@@ -105,10 +106,14 @@ def aided_settings(table: AidedTable, where: object) -> AidedSettings:
 _METHODS = {
     "static_start": ("multiposition",),
     "g_sensitivity": ("multiposition", "aided"),
+    "sections": ("sections",),
+    "section": ("sections",),
+    "placing": ("sections",),
+    "level": ("sections",),
     "bias_drift": ("multiposition",),
     "exclude": ("multiposition", "means", "known_rates"),
-    "k2": ("multiposition", "ferraris", "means", "aided"),
-    "time_base": ("multiposition", "ferraris", "aided", "known_turns"),
+    "k2": ("multiposition", "ferraris", "means", "aided", "sections"),
+    "time_base": ("multiposition", "ferraris", "aided", "known_turns", "sections"),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
     "alignment": ("known_turns",),
@@ -157,12 +162,35 @@ class TurnsTable(Strict):
 class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     """Settings of the calibration."""
 
-    method: Literal["multiposition", "ferraris", "aided", "means", "known_rates", "known_turns"] = Field(
+    method: Literal[
+        "multiposition", "ferraris", "aided", "means", "known_rates", "known_turns", "sections"
+    ] = Field(
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
         "turns by a known angle; aided: on a table whose angles are in the record; means: a row of mean outputs for "
         "each pose, accelerometers; known_rates: a gyro on a platter or rate table, in unknown orientations; "
-        "known_turns: a gyro, a turn by a known angle about each axis",
+        "known_turns: a gyro, a turn by a known angle about each axis; sections: rests, rates and turns, each with "
+        "what is known of it",
+    )
+    sections: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None,
+        examples=["sections.csv"],
+        description="of sections: the table of the sections, beside the study; from names, labels and the recordings "
+        "if absent",
+    )
+    section: list[dict[str, Any]] = Field(
+        default=[],
+        examples=[[{"section": "x up", "file": "x_up.csv", "up": "+x"}]],
+        description="of sections: the sections themselves in the place of a table, with the same keys as its columns",
+    )
+    placing: Annotated[Quantity, QuantityText("angle", "0.3 deg", TILT.accept, TILT.words)] | None = Field(
+        default=None,
+        description="of sections: standard uncertainty of every direction and axis whose section states none; from the "
+        "scatter if absent",
+    )
+    level: Annotated[Quantity, QuantityText("angle", "0.05 deg", TILT.accept, TILT.words)] | None = Field(
+        default=None,
+        description="of sections: the axes of turns and rates are vertical within this; not known if absent",
     )
     rates: list[Rate] = Field(
         default=[],
@@ -205,6 +233,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         for key in ("rates", "turns"):
             if self.method == f"known_{key}" and not getattr(self, key):
                 raise refusal(f"{key}: missing, expected it with method = {self.method!r}")
+        if self.sections is not None and self.section:
+            raise refusal("section: found beside sections, expected one of the two")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
@@ -295,6 +325,13 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
             x, y, z = table.turns.x, table.turns.y, table.turns.z
             alignment = None if table.alignment is None else table.alignment.value
             return KnownTurnsSettings((x.value, y.value, z.value), (x.u, y.u, z.u), alignment)
+        case "sections":
+            return SectionsSettings(
+                None if table.sections is None else Path(path).parent / table.sections,
+                tuple(table.section),
+                None if table.placing is None else table.placing.value,
+                None if table.level is None else table.level.value,
+            )
     return None
 
 

@@ -16,6 +16,8 @@ from inercal.systems.imu.known_turns.figures import pictures as of_known_turns
 from inercal.systems.imu.means.calibration import MeansCalibration
 from inercal.systems.imu.means.figures import pictures as of_means
 from inercal.systems.imu.multiposition.figures import pictures as of_multiposition
+from inercal.systems.imu.sections.figures import pictures as of_sections
+from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
 if TYPE_CHECKING:
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
         | MeansCalibration
         | KnownRatesCalibration
         | KnownTurnsCalibration
+        | CalibrationFromSections
     )
 
 
@@ -48,6 +51,8 @@ def pictures(calibration: AnyCalibration) -> list[Picture]:
             return of_known_rates(calibration)
         case KnownTurnsCalibration():
             return of_known_turns(calibration)
+        case CalibrationFromSections():
+            return of_sections(calibration)
         case _:
             return of_multiposition(calibration)
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -111,7 +112,34 @@ class KnownTurnsSettings:
     alignment: float | None = None
 
 
-Method: TypeAlias = FerrarisSettings | AidedSettings | MeansSettings | KnownRatesSettings | KnownTurnsSettings
+@dataclass(frozen=True)
+class SectionsSettings:
+    """Options of a calibration from sections.
+
+    Attributes
+    ----------
+    table : Path or None
+        The table of sections; None: those of ``rows`` or, without any, what names and recordings tell.
+    rows : sequence of mappings
+        Tables ``[[imu.section]]`` of the study, as typed.
+    placing, level
+        As their keys say [rad].
+    """
+
+    table: Path | None = None
+    rows: tuple[Mapping[str, object], ...] = ()
+    placing: float | None = None
+    level: float | None = None
+
+
+Method: TypeAlias = (
+    FerrarisSettings
+    | AidedSettings
+    | MeansSettings
+    | KnownRatesSettings
+    | KnownTurnsSettings
+    | SectionsSettings
+)
 """Options of a method other than multi-position."""
 
 

@@ -21,6 +21,7 @@ from inercal.systems.imu.settings import (
     KnownRatesSettings,
     KnownTurnsSettings,
     MeansSettings,
+    SectionsSettings,
 )
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
     from inercal.systems.imu.means.calibration import MeansCalibration
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
+    from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
     Calibrated = (
         MultipositionCalibration
@@ -38,17 +40,19 @@ if TYPE_CHECKING:
         | MeansCalibration
         | KnownRatesCalibration
         | KnownTurnsCalibration
+        | CalibrationFromSections
     )
 
 
 def in_order(settings: ImuSettings) -> bool:
-    """True where a calibration is of several records in order, one for each rate or turn: they are no repeat runs."""
-    return isinstance(settings.method, KnownRatesSettings | KnownTurnsSettings)
+    """True where a calibration is of several records together, one for each rate or turn, or some sections each: they
+    are no repeat runs."""
+    return isinstance(settings.method, KnownRatesSettings | KnownTurnsSettings | SectionsSettings)
 
 
 def in_rows(settings: ImuSettings) -> bool:
     """True where rows of a file are means, which need no times."""
-    return isinstance(settings.method, MeansSettings | KnownRatesSettings)
+    return isinstance(settings.method, MeansSettings | KnownRatesSettings | SectionsSettings)
 
 
 def calibrate(
@@ -125,6 +129,10 @@ def _by_method(
             from inercal.systems.imu.aided.calibration import calibrate_aided
 
             return calibrate_aided(record, settings, settings.method, progress)
+        case SectionsSettings():
+            from inercal.systems.imu.sections.outcome import calibrate_from_sections
+
+            return calibrate_from_sections(records, settings, settings.method, progress)
         case None:
             from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
 

@@ -11,7 +11,7 @@ from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.calibration import SectionCalibration, contradicted
-from inercal.systems.imu.sections.checks import direction
+from inercal.systems.imu.sections.cutting.checks import direction
 from inercal.systems.imu.sections.limits import LIMITS
 
 _WORDS = {
@@ -35,7 +35,7 @@ def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
 
 
 def verdict(found: SectionCalibration, before: Sequence[Finding]) -> tuple[Status, str]:
-    """Status and message of a calibration; ``before`` are the findings of `inercal.systems.imu.sections.checks`."""
+    """Status and message of a calibration; ``before`` are findings of checks before the fit."""
     sections = counted(len(found.problem.readings.sections), "section")
     if before:
         return Status.INCONSISTENT, before[0].message

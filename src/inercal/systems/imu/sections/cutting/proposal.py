@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
-from inercal.foundation.errors import RecordError
+from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.record import Record
@@ -74,6 +74,45 @@ class Proposal:
         return Proposal(
             tuple(rows), tuple(sections), done.unused, (*questions, *contradictions(sections, scale))
         )
+
+    @staticmethod
+    def by(rows: Sequence[SectionRow], records: Mapping[str, Record]) -> Proposal:
+        """The sections that rows state of recordings, given by the names of their files.
+
+        Raises
+        ------
+        RecordError
+            A recording has neither accelerometers nor gyros.
+        StudyError
+            A row names another file, or the rows of a table of means are more or fewer than its own.
+        """
+        files = {name: _recorded(name, record) for name, record in records.items()}
+        only = next(iter(files)) if len(files) == 1 else ""
+        rows = [replace(row, file=row.file or only) for row in rows]
+        for row in rows:
+            if row.file not in files:
+                raise StudyError(
+                    f"section {row.section}",
+                    f"found the file {row.file or '(none)'}, expected one of {', '.join(files)}",
+                )
+        sections: list[Section] = []
+        for name, file in files.items():
+            if is_counted(file.record):
+                mine = [row for row in rows if row.file == name]
+                table = Means(_values(file.acc), _values(file.gyro))
+                count = len(next(iter(file.record.columns.values())).values)
+                if len(mine) != count:
+                    raise StudyError(
+                        name,
+                        f"found {count} rows of means, but {len(mine)} sections, expected one for each row",
+                    )
+                sections += sections_of_means(mine, table)
+        recorded = {n: (f.acc, f.gyro) for n, f in files.items() if not is_counted(f.record)}
+        done = cut(stretches_of(rows, recorded))
+        sections += done.sections
+        scales = {_scale(file.record) for file in files.values() if file.gyro is not None}
+        scale = scales.pop() if len(scales) == 1 else None
+        return Proposal(tuple(rows), tuple(sections), done.unused, contradictions(sections, scale))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,45 @@
+"""The figures of a calibration from sections: coefficients, what is left of each section, correlation and budget."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from inercal.faces.report.coefficients import budget, correlation, values
+from inercal.faces.report.html import Picture
+from inercal.faces.report.marks import Axis, Dots, Level, Panel
+from inercal.faces.report.panels import draw
+from inercal.systems.imu.sections.calibration import SectionCalibration
+from inercal.systems.imu.sections.outcome import CalibrationFromSections
+
+
+def pictures(calibration: CalibrationFromSections) -> list[Picture]:
+    """Draw what there is to see of a calibration of any status; nothing where there was no fit."""
+    estimate, found = calibration.estimate, calibration.found
+    if found is None:
+        return []
+    return [_left(found), values(estimate), correlation(estimate), budget(estimate)]
+
+
+def _left(found: SectionCalibration) -> Picture:
+    """What the fit leaves of each output."""
+    readings, panels = found.problem.readings, []
+    for name, kind in (("accelerometers", 0), ("gyro", 2)):
+        seen = readings.seen[:, kind]
+        if seen.any():
+            numbers = np.broadcast_to(np.arange(1, len(seen) + 1)[:, None], seen.shape)[seen]
+            panels.append(
+                [
+                    Panel(
+                        [Level(0.0), Dots(numbers, found.residuals[:, kind][seen])],
+                        Axis("section", whole=True, margin=0.02),
+                        Axis(f"{name}\n[output]"),
+                        grid="y",
+                    )
+                ]
+            )
+    return draw(
+        "Residuals of the sections",
+        "Mean outputs of each section less those of the model, all axes, by the number of the section.",
+        panels,
+        0.5 + 1.6 * len(panels),
+    )

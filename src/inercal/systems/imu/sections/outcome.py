@@ -1,0 +1,263 @@
+"""Calibration of an IMU from sections of recordings: recordings and a study in, an estimate out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from inercal.foundation.arrays import short_repr
+from inercal.foundation.errors import RecordError
+from inercal.foundation.findings import Finding, Status
+from inercal.foundation.instruments.terms import TERMS
+from inercal.foundation.records.column import Triad
+from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import Formula, conditions_of, studied
+from inercal.foundation.results.budget import BudgetItem, Uncertainty
+from inercal.foundation.results.result import Estimate, timed
+from inercal.foundation.units import RAW
+from inercal.systems.imu.rows import is_counted, rows_of
+from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
+from inercal.systems.imu.sections.cutting.proposal import Proposal
+from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
+from inercal.systems.imu.sections.findings import findings_of, verdict
+from inercal.systems.imu.sections.missing import missing
+from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
+
+MODEL = Formula(
+    r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
+    "sections of which directions, rates and angles are known or not, each within its u; $M$, $T$ of unit diagonal. "
+    "Variances that nobody states by restricted likelihood."
+)
+REFERENCES = (
+    "Patterson, Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 (1971) 545",
+)
+_KNOWN = "axes of the case, by the known directions and axes"
+_OWN = "z along the input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z"
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class CalibrationFromSections:
+    """An ``estimate``, the ``sections`` that were read, and the calibration ``found``, if any."""
+
+    estimate: Estimate
+    sections: tuple[Section, ...]
+    found: SectionCalibration | None = None
+
+
+def calibrate_from_sections(
+    records: Sequence[Record],
+    settings: ImuSettings,
+    options: SectionsSettings,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CalibrationFromSections:
+    """Calibrate from the sections that a study states, or that names and recordings tell.
+
+    Raises
+    ------
+    InputError
+        A recording without either triad, recordings in several units, or sections that do not fit them.
+    """
+    clock = time.perf_counter()
+    progress("reading the sections")
+    named = _named(records)
+    units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
+    proposal = _proposal(named, options)
+    sections = tuple(_placed(section, options) for section in proposal.sections)
+    findings = (*_of_records(records), *proposal.questions)
+    sources = [source for record in records for source in record.sources]
+    bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
+    none: Mapping[str, Any] = {"method": "sections", "sections": []}
+    if not sections:
+        text = "found no section that can be read: state them in a table, imu.sections"
+        estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
+        return CalibrationFromSections(timed(estimate, clock), sections)
+    priors = Priors(
+        settings.site,
+        clock_u=settings.time_base_u,
+        acc_scale=_scale(units["acc"]),
+        gyro_scale=_scale(units["gyro"]),
+        k2=math.inf if settings.k2 else settings.k2_u,
+    )
+    lacking = missing(sections, priors)
+    if lacking is not None:
+        what = ", ".join(lacking.terms)
+        cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
+        text = f"the sections leave {what} open: add {cure}"
+        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
+        return CalibrationFromSections(timed(estimate, clock), sections)
+    progress("fitting the sections")
+    try:
+        found = calibrate_sections(sections, priors)
+    except LinAlgError:
+        text = "the sections leave some combination of coefficients open: add rests on all six sides"
+        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
+        return CalibrationFromSections(timed(estimate, clock), sections)
+    estimate = _estimate(found, settings, records, units, proposal, findings)
+    return CalibrationFromSections(timed(estimate, clock), sections, found)
+
+
+def _named(records: Sequence[Record]) -> dict[str, Record]:
+    """The records by the names of their files."""
+    named: dict[str, Record] = {}
+    for record in records:
+        name = PurePath(record.sources[0].path).name if record.sources else "recording"
+        named[name if name not in named else f"{name} ({len(named) + 1})"] = record
+    return named
+
+
+def _unit(sensor: str, records: Sequence[Record]) -> Triad | None:
+    """A triad of the records, which tells the unit of all; None where there is none."""
+    triads = [
+        record.triad(sensor) for record in records if all(f"{sensor}_{axis}" in record for axis in "xyz")
+    ]
+    symbols = {triad.unit.symbol for triad in triads}
+    if len(symbols) > 1:
+        raise RecordError(
+            triads[-1].source.path,
+            f"found {sensor} in {' and '.join(sorted(symbols))}, expected one unit in all files",
+        )
+    return triads[0] if triads else None
+
+
+def _scale(triad: Triad | None) -> Size | None:
+    """The scale factors of physical outputs beforehand; None in counts."""
+    return None if triad is None or triad.unit.dimension in RAW else Size(1.0 / triad.unit.factor, 0.05)
+
+
+def _proposal(named: Mapping[str, Record], options: SectionsSettings) -> Proposal:
+    """The sections that the study states, or that recordings tell."""
+    rows: tuple[SectionRow, ...] = ()
+    if options.table is not None:
+        rows = read_table(options.table)
+    elif options.rows:
+        rows = of_tables(options.rows)
+    return Proposal.by(rows, named) if rows else Proposal.of(named)
+
+
+def _placed(section: Section, options: SectionsSettings) -> Section:
+    """The section with the placing and level of all where it states none."""
+    turning = section.kind in ("rate", "turn")
+    return replace(
+        section,
+        up_u=options.placing if section.up_u is None else section.up_u,
+        axis_u=options.placing if section.axis_u is None else section.axis_u,
+        level_u=options.level if turning and section.level_u is None else section.level_u,
+    )
+
+
+def _of_records(records: Sequence[Record]) -> tuple[Finding, ...]:
+    """Findings about the recordings; those about time do not hold for rows of means."""
+    found: dict[Finding, None] = {}
+    for record in records:
+        counted = is_counted(record)
+        sensor = "acc" if "acc_x" in record else "gyro"
+        for finding in rows_of(record, sensor)[2] if counted else record.findings:
+            found[replace(finding, harm=()) if finding.code in MASKED else finding] = None
+    return tuple(found)
+
+
+def _estimate(
+    found: SectionCalibration,
+    settings: ImuSettings,
+    records: Sequence[Record],
+    units: Mapping[str, Triad | None],
+    proposal: Proposal,
+    findings: Sequence[Finding],
+) -> Estimate:
+    """Put the estimate together."""
+    triads = {sensor: triad for sensor, triad in units.items() if triad is not None}
+    symbols = {sensor: triad.unit.symbol for sensor, triad in triads.items()}
+    g, readings = settings.site.gravity, found.problem.readings
+    ranges: dict[str, Any] = {"specific_force_along_an_axis_m_s2": [-g, g]}
+    if np.any(readings.rate != 0.0):
+        ranges["rate_of_turn_rad_s"] = float(np.max(np.abs(readings.rate)))
+    known = bool(
+        np.any(readings.know_up & readings.has_force) or np.any(readings.know_axis & (readings.rate != 0.0))
+    )
+    conditions = conditions_of(
+        settings, recorded_temperature(records[0]), ranges, frame=_KNOWN if known else _OWN
+    )
+    sources = [source for record in records for source in record.sources]
+    basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
+    budget = tuple(
+        _item(found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0})
+        for source, shares in found.budget.items()
+    )
+    return Estimate.of(
+        basis,
+        found.names,
+        [
+            TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"])
+            for name in found.names
+        ],
+        found.x,
+        Uncertainty(found.covariance, found.dof, budget),
+        verdict(found, proposal.questions),
+        findings=(*findings, *findings_of(found)),
+        statistics={
+            "dof": found.freedom,
+            "chi2": found.chi2,
+            "probability": found.probability,
+            "intervals": float(len(readings.sections)),
+        },
+        result={
+            "method": "sections",
+            "sections": _table(found),
+            "unused": dict(proposal.unused),
+            "by_prior": list(found.by_prior),
+            "scatter": dict(found.scatter),
+            "unit": symbols,
+        },
+    )
+
+
+def _item(found: SectionCalibration, source: str, share: Mapping[str, float]) -> BudgetItem:
+    """A line of the budget."""
+    noise = {"noise of the accelerometers": ("acc", "m/s^2"), "noise of the gyro": ("gyro", "rad/s")}
+    if source in noise:
+        sensor, unit = noise[source]
+        return BudgetItem(source, "A", found.noise.get(sensor, 0.0), unit, share, True)
+    if source == "placing" and "placing" in found.scatter:
+        return BudgetItem(source, "A", found.scatter["placing"], "rad", share, True)
+    problem = found.problem
+    sds = [float(problem.sd[p]) for p in np.flatnonzero(problem.free) if problem.source(int(p)) == source]
+    u = max((sd for sd in sds if math.isfinite(sd)), default=0.0)
+    units = {
+        "gravity": "m/s^2",
+        "earth rate": "rad/s",
+        "earth rate, level part": "rad/s",
+        "angles and rates": "rad/s",
+    }
+    units |= {"K2 of the accelerometers": "1/(m/s^2)", "g-sensitivity of the gyro": "(rad/s)/(m/s^2)"}
+    angles = ("mounting", "placing", "axes", "prior of M", "prior of T")
+    return BudgetItem(source, "B", u, units.get(source, "rad" if source in angles else "1"), share)
+
+
+def _table(found: SectionCalibration) -> list[Mapping[str, Any]]:
+    """One row for each section: what it is, what the fit leaves of it in its noise, how far it lies off its place."""
+    rows: list[Mapping[str, Any]] = []
+    readings = found.problem.readings
+    for k, section in enumerate(readings.sections):
+        row: dict[str, Any] = {
+            "section": section.name,
+            "kind": section.kind,
+            "where": section.where,
+            "why": section.why,
+        }
+        for sensor, kind in (("acc", 0), ("gyro", 2)):
+            seen = readings.seen[k, kind]
+            if seen.any():
+                row[f"{sensor}_residual"] = float(np.sqrt(np.mean(found.residuals[k, kind][seen] ** 2)))
+        row["off_its_place_rad"] = float(found.placed[k].max())
+        rows.append(row)
+    return rows
