@@ -38,7 +38,7 @@ _EVEN: Final = 1.2
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """What lies between two rests: samples from the last of section ``first`` to the first of section ``last``.
+    """A motion between two rests: samples from the last of section ``first`` to the first of section ``last``.
 
     ``t`` (L,) [s], outputs ``gyro`` (L, 3) and ``acc`` (L, 3), None where there are none. ``turn`` (3,) is the rotation
     vector [rad] on the axes of the case by which it turned in all, None where nobody knows it, within the standard
@@ -151,7 +151,7 @@ def rotations(moved: Increments, unknowns: Array, session: Array) -> Rotations:
 
 
 def _turning_axes(phi: Array) -> Array:
-    """What the turning of their axes adds to the rotation vectors (L, m, 3) of intervals."""
+    """Additions of the turning of their axes to the rotation vectors (L, m, 3) of intervals."""
     change = np.zeros_like(phi)
     change[:-1] += phi[1:]
     change[1:] -= phi[:-1]

@@ -73,7 +73,7 @@ def _suspects(linear: Linear, z: Array) -> Iterator[tuple[int, int]]:
 
 
 def _judged(linear: Linear, z: Array, block: int, cell: int) -> _Judged | None:
-    """How far a cell lies off the others by their own scatter; None where these alone tell too little."""
+    """Judge a cell by the scatter of the others without it; None where these alone tell too little."""
     try:
         there, _ = mode(linear.without(cell, block), z)
         rest, covariance = linear.left(there, linear.at(there))[block]

@@ -82,7 +82,7 @@ class SwingCalibration:
 
 
 @dataclass(frozen=True, eq=False)
-class _Windows:
+class _SwingWindows:
     """Mean outputs ``mean`` (m, 3) of windows of ``length`` samples from rows ``first`` (m,) on, the part ``short``
     (m,) by which turning shortens them, what a metre of ``arm`` (m, 3, 3) adds over gravity, and the typical rate of
     turning ``speed`` [rad/s]."""
@@ -96,7 +96,7 @@ class _Windows:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fitted:
+class _SwingFit:
     """Unknowns ``p`` (13,) with the scale ``s`` of their scatter, and at them residuals, weights, normal matrix and
     correlation factor."""
 
@@ -188,7 +188,9 @@ def _means(y: Array, length: int) -> Array:
     return np.asarray(y[: len(y) // length * length].reshape(-1, length, 3).mean(axis=1))
 
 
-def _windows(acc: Array, rate: float | None, gyro: Array | None, start: Sphere, gravity: float) -> _Windows:
+def _windows(
+    acc: Array, rate: float | None, gyro: Array | None, start: Sphere, gravity: float
+) -> _SwingWindows:
     """Windows short enough for the turning that the gyro tells, or directions over 0.2 s."""
     n, speed = 1, 0.0
     if rate is not None:
@@ -214,7 +216,7 @@ def _windows(acc: Array, rate: float | None, gyro: Array | None, start: Sphere, 
         angle = np.linalg.norm(w, axis=1) * n / rate
         short = angle**2 / 24.0
         usable &= (angle < LIMITS.swing_turn) & np.isfinite(arm).all(axis=(1, 2))
-    return _Windows(mean[usable], first[usable], n, short[usable], arm[usable], speed)
+    return _SwingWindows(mean[usable], first[usable], n, short[usable], arm[usable], speed)
 
 
 def _force(p: Values, mean: Array) -> Values:
@@ -224,7 +226,7 @@ def _force(p: Values, mean: Array) -> Values:
     return np.stack([v[:, 0] - p[6] * y - p[7] * v[:, 2], y, v[:, 2]], axis=1)
 
 
-def _miss(windows: _Windows, p: Values, s: float) -> Values:
+def _miss(windows: _SwingWindows, p: Values, s: float) -> Values:
     """Distances (m,) in outputs by which |f| misses gravity. Taken in f, a large K1 would make all of them small."""
     f = _force(p, windows.mean)
     size = np.sqrt(np.sum(f * f, axis=1))
@@ -238,7 +240,7 @@ def _miss(windows: _Windows, p: Values, s: float) -> Values:
     return np.asarray(e / np.sqrt(slope))
 
 
-def _fitted(windows: _Windows, p: Array, s: float, prior: Array, free: Flags) -> tuple[_Fitted, Array]:
+def _fitted(windows: _SwingWindows, p: Array, s: float, prior: Array, free: Flags) -> tuple[_SwingFit, Array]:
     """Unknowns by Student's likelihood, with the inverse covariance (13, 13) of what was known beforehand. The scatter
     and the correlation of neighbours are found anew four times."""
     steps, more, inside = 1e-30j * np.eye(13), 1.0, np.ix_(free, free)
@@ -269,7 +271,7 @@ def _fitted(windows: _Windows, p: Array, s: float, prior: Array, free: Flags) ->
             if np.sqrt(change[free] @ A @ change[free]) < 1e-3:
                 break
         more = _correlation(weights * e)
-    return _Fitted(p, s, e, weights, normal, more), P
+    return _SwingFit(p, s, e, weights, normal, more), P
 
 
 def _correlation(values: Array) -> float:
@@ -284,9 +286,17 @@ def _correlation(values: Array) -> float:
 
 
 def _result(
-    windows: _Windows, fitted: _Fitted, P: Array, prior: Array, free: Flags, typical: float, g: float, refusal: str, *,
+    windows: _SwingWindows,
+    fitted: _SwingFit,
+    P: Array,
+    prior: Array,
+    free: Flags,
+    typical: float,
+    g: float,
+    refusal: str,
+    *,
     blind: bool,
-) -> SwingCalibration:  # fmt: skip
+) -> SwingCalibration:
     """Coefficients with covariance, what rests on priors, what lies off. ``blind``: turned without a gyro."""
     p, s, e, weights, inside = fitted.p, fitted.s, fitted.e, fitted.weights, np.ix_(free, free)
     # mean curvature of the cost, and the variance of its slope, each with the correlation of neighbours

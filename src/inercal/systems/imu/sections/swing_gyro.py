@@ -64,7 +64,7 @@ class SwingGyro:
     covariance: Array
 
 
-class _Fit(NamedTuple):
+class _TurnFit(NamedTuple):
     """Unknowns (12,), their covariance, and the share of the motion explained."""
 
     x: Array
@@ -117,7 +117,7 @@ def gravity_turns(force: Array, gyro: Array, t: Array) -> GravityTurns | None:
     for length in _LENGTHS:
         fit = _fitted(by, u, calm, step / typical, length)
         if fit is not None:
-            fits.append(_Fit(fit.x * unit, fit.covariance * np.outer(unit, unit), fit.share))
+            fits.append(_TurnFit(fit.x * unit, fit.covariance * np.outer(unit, unit), fit.share))
     if not fits:
         return None
     best, *others = sorted(
@@ -128,7 +128,7 @@ def gravity_turns(force: Array, gyro: Array, t: Array) -> GravityTurns | None:
     return GravityTurns(best.x, best.covariance, _axes(best, confirmed), best.share)
 
 
-def _fitted(by: Array, u: Array, calm: Flags, step: Array, length: int) -> _Fit | None:
+def _fitted(by: Array, u: Array, calm: Flags, step: Array, length: int) -> _TurnFit | None:
     """A fit over windows of a number of samples that begin and end where nothing pushes, and hold no gap."""
     edges = np.arange(0, len(u), length)
     if len(edges) < 15:
@@ -146,10 +146,10 @@ def _fitted(by: Array, u: Array, calm: Flags, step: Array, length: int) -> _Fit 
         return None
     left = b - A @ x
     covariance = np.linalg.inv(A.T @ A) * float(left @ left) / (len(b) - 12)
-    return _Fit(np.asarray(x, dtype=float), covariance, 1.0 - float(left @ left) / float(b @ b))
+    return _TurnFit(np.asarray(x, dtype=float), covariance, 1.0 - float(left @ left) / float(b @ b))
 
 
-def _axes(fit: _Fit, confirmed: Flags) -> tuple[int, ...]:
+def _axes(fit: _TurnFit, confirmed: Flags) -> tuple[int, ...]:
     """The axis of each channel, 0 where it is not told; none where channels share one or differ in their scale."""
     matrix, length = fit.x[:9].reshape(3, 3), np.maximum(fit.length, 1e-300)
     place = np.argmax(np.abs(matrix), axis=0)

@@ -46,7 +46,7 @@ class CalibrationWithMoves:
     spoiled: tuple[str, ...]
     """Terms, or the scatter, of the accelerometers that moves made worse, for which these have no say in them."""
     rescaled: bool
-    """Whether moves deny the scale that was said of the gyro."""
+    """True where moves deny the scale that was said of the gyro."""
 
 
 def calibrate_with_moves(
