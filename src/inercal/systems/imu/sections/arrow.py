@@ -92,13 +92,14 @@ class Linear:
             [[np.log(size.median), size.spread] for size in problem.sizes.values()]
         ).reshape(-1, 2)
 
-    def without(self, section: int) -> Linear:
-        """The problem without the means of a section."""
-        first, *others = self._blocks
-        used = first.used.copy()
-        used[section] = 0.0
+    def without(self, cell: int, block: int = 0) -> Linear:
+        """The problem without a cell of a block: the means of a section, which are the first block, or a move."""
+        blocks = list(self._blocks)
+        used = blocks[block].used.copy()
+        used[cell] = 0.0
+        blocks[block] = replace(blocks[block], used=used)
         out = copy(self)
-        out._blocks = [replace(first, used=used), *others]
+        out._blocks = blocks
         return out
 
     def _gathered(self, block: RowBlock, place: Places) -> _Gathered:

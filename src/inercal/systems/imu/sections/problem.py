@@ -85,18 +85,36 @@ class RowBlock:
 class Extra(Protocol):
     """More rows than those of means, such as moves between rests, and the unknowns that they bring."""
 
-    labels: tuple[str, ...]
-    """Sources in budgets of its own shared unknowns (e,), which stand last among the shared ones."""
-    mean: Array
-    sd: Array
-    """Means and standard deviations of these beforehand (e,)."""
-    sizes: dict[str, Size]
-    """Components of variance that it brings."""
-    runs: Places
-    """Which of its unknowns (n,) is the first of three of the earth rate of a section, along ``level`` of the point,
-    instead of the section's own; -1 where it has its own."""
-    rotates: bool
-    """True where it tells scale factors of the gyro, as motions do."""
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Sources in budgets of its own shared unknowns (e,), which stand last among the shared ones."""
+        ...
+
+    @property
+    def mean(self) -> Array:
+        """Values of these beforehand (e,)."""
+        ...
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations of these values (e,)."""
+        ...
+
+    @property
+    def sizes(self) -> dict[str, Size]:
+        """Components of variance that it brings."""
+        ...
+
+    @property
+    def runs(self) -> Places:
+        """Places (n,) among its unknowns of the first of three of the earth rate of a section, along ``level`` of the
+        point, instead of the section's own; -1 where it has its own."""
+        ...
+
+    @property
+    def rotates(self) -> bool:
+        """True where it tells scale factors of the gyro, as motions do."""
+        ...
 
     def blocks(self, problem: Problem, point: Iterate) -> tuple[RowBlock, ...]:
         """Its rows at a point."""

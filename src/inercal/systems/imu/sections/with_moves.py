@@ -1,0 +1,195 @@
+"""Calibration from sections and the moves between them.
+
+Moves whose samples are not whole are left out and named. The accelerometers are fitted alone first: the gyro must not
+spoil them. Where moves raise their scatter or their u, the moves are at fault and lose their say in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.records.checks.values import at_ends
+from inercal.systems.imu.limits import LIMITS as OF_ALL
+from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
+from inercal.systems.imu.sections.carried import Increments, Move, increments, net_rotations
+from inercal.systems.imu.sections.limits import LIMITS
+from inercal.systems.imu.sections.moves import MoveRows, move_rows
+from inercal.systems.imu.sections.outputs import effective, verticals
+from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.unknowns import COMMON
+
+
+class MoveLeftOut(NamedTuple):
+    """A move that is not whole: its place in the list, and why in words."""
+
+    move: int
+    why: str
+
+
+@short_repr
+@dataclass(frozen=True, eq=False)
+class CalibrationWithMoves:
+    """A calibration from sections and moves."""
+
+    calibration: SectionCalibration
+    alone: SectionCalibration
+    """That of the accelerometers without the gyro."""
+    used: tuple[int, ...]
+    """Places of the moves that count."""
+    left_out: tuple[MoveLeftOut, ...]
+    spoiled: tuple[str, ...]
+    """Terms, or the scatter, of the accelerometers that moves made worse, for which these have no say in them."""
+    rescaled: bool
+    """True where moves deny the scale that was said of the gyro."""
+
+
+def calibrate_with_moves(
+    sections: Sequence[Section], moves: Sequence[Move], priors: Priors
+) -> CalibrationWithMoves:
+    """Calibrate accelerometers and gyro from sections, among them rests, and moves between these in the order of time.
+
+    Raises
+    ------
+    LinAlgError
+        Too little is known for any solution.
+    """
+    left_out = not_whole(moves)
+    used = tuple(k for k in range(len(moves)) if k not in {each.move for each in left_out})
+    alone = calibrate_sections([replace(s, gyro=None, gyro_var=None) for s in sections], priors)
+    kept = [moves[k] for k in used]
+    if not kept:
+        joint = calibrate_sections(sections, priors)
+        return CalibrationWithMoves(joint, alone, used, left_out, (), rescaled=False)
+    scaled, rescaled = _scaled(sections, kept, priors, alone)
+    extra = move_rows(len(sections), kept, scaled)
+    joint = calibrate_sections(sections, scaled, (extra,))
+    spoiled = _spoiled(alone, joint)
+    if spoiled:
+        joint = _without_say(sections, scaled, extra, alone)
+    return CalibrationWithMoves(joint, alone, used, left_out, spoiled, rescaled)
+
+
+def not_whole(moves: Sequence[Move]) -> tuple[MoveLeftOut, ...]:
+    """Moves with clipped samples, gaps or lost stamps."""
+    if not moves:
+        return ()
+    y = np.concatenate([move.gyro for move in moves])
+    clipped = np.any([at_ends(values) for values in y.T], axis=0)
+    of = np.repeat(np.arange(len(moves)), [len(move.t) for move in moves])
+    steps = np.concatenate([np.diff(move.t) for move in moves])
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else np.inf
+    out = []
+    for k, move in enumerate(moves):
+        step = np.diff(move.t)
+        lost = int(np.sum(~np.isfinite(move.gyro).all(axis=1)))
+        if not len(step) or not np.all(step > 0.0):
+            out.append(MoveLeftOut(k, "its time stamps do not rise"))
+        elif lost:
+            out.append(MoveLeftOut(k, f"{lost} of its samples are lost"))
+        elif (longest := float(step.max())) > OF_ALL.motion_gap * usual:
+            out.append(MoveLeftOut(k, f"it has a gap of {longest:.3g} s"))
+        elif count := int(np.sum(clipped[of == k])):
+            out.append(MoveLeftOut(k, f"{count} of its samples are clipped"))
+    return tuple(out)
+
+
+def _scaled(
+    sections: Sequence[Section], moves: Sequence[Move], priors: Priors, alone: SectionCalibration
+) -> tuple[Priors, bool]:
+    """The priors with a scale of the gyro that carries the verticals of rests, and whether what was said of it does
+    not. A scale that other sections tell needs no guess."""
+    if any(s.kind != "rest" and s.gyro is not None for s in sections):
+        return priors, False
+    said = priors.gyro_scale
+    up = _verticals(alone)
+    rests = np.array([s.gyro for s in sections if s.gyro is not None and np.isfinite(s.gyro).all()])
+    bias = np.median(rests, axis=0) if len(rests) else np.zeros(3)
+    coarse = _thinned(increments(moves))
+    raw = coarse.gyro - coarse.dt[..., None] * bias
+    ends = np.array([(move.first, move.last) for move in moves])
+
+    def missed(scale: float) -> float:
+        R = net_rotations(raw / scale)
+        carried = np.einsum("mji,mj->mi", R, up[ends[:, 0]])
+        return float(np.sqrt(np.median(np.sum((carried - up[ends[:, 1]]) ** 2, axis=1))))
+
+    if said is not None and missed(said.median) < OF_ALL.vertical_miss:
+        return priors, False
+    swept = max(float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0))), 1e-300)
+    scales = swept / np.geomspace(LIMITS.least_sweep, LIMITS.largest_sweep, 62)
+    misses = [missed(scale) for scale in scales]
+    best = int(np.argmin(misses))
+    if said is not None and misses[best] > OF_ALL.vertical_miss:
+        return priors, False
+    return replace(priors, gyro_scale=Size(float(scales[best]), LIMITS.open_scale)), said is not None
+
+
+def _verticals(found: SectionCalibration) -> Array:
+    """Directions of specific force (n, 3) of a calibration."""
+    x = found.point.x
+    return np.asarray(verticals(found.problem, found.point, x[:COMMON], effective(found.problem, x)).real)
+
+
+def _thinned(moved: Increments) -> Increments:
+    """Increments in at most some 80 intervals, for a first guess."""
+    length = max(1, len(moved.dt) // 80)
+    pad = -len(moved.dt) % length
+    dt, gyro, acc = (
+        np.pad(x, [(0, pad)] + [(0, 0)] * (x.ndim - 1)).reshape(-1, length, *x.shape[1:]).sum(axis=1)
+        for x in (moved.dt, moved.gyro, moved.acc)
+    )
+    return Increments(dt, gyro, acc)
+
+
+def _spoiled(alone: SectionCalibration, joint: SectionCalibration) -> tuple[str, ...]:
+    """Terms of the accelerometers whose u the moves raise, and ``scatter`` where they raise that beyond chance."""
+    out = [
+        name
+        for name in alone.names
+        if name in joint.names and joint.value(name)[1] > LIMITS.raised_u * alone.value(name)[1]
+    ]
+    for name, scatter in alone.scatter.items():
+        if name.startswith("acc") and name in joint.scatter:
+            chance = 1.0 / np.sqrt(2.0 * max(alone.scatter_dof[name], 1.0))
+            if np.log(joint.scatter[name] / scatter) > LIMITS.raised_scatter * chance:
+                out.append("scatter")
+    if any(name.startswith("acc") for name in joint.scatter.keys() - alone.scatter.keys()):
+        out.append("scatter")
+    return tuple(dict.fromkeys(out))
+
+
+def _without_say(
+    sections: Sequence[Section], priors: Priors, extra: MoveRows, alone: SectionCalibration
+) -> SectionCalibration:
+    """The accelerometers alone, and the gyro by moves between rests whose scatter is that of the accelerometers
+    alone."""
+    size = alone.noise["acc"]
+    plain = [s if s.acc is None else replace(s, acc_var=None, scatter="") for s in sections]
+    held = replace(priors, acc_scatter=Size(size, LIMITS.held_scatter), excess=priors.excess - {"acc"})
+    joint = calibrate_sections(plain, held, (extra,))
+    x, u, U, dof, C = (np.array(y) for y in (joint.x, joint.u, joint.U, joint.dof, joint.covariance))
+    at = [k for k, name in enumerate(joint.names) if name in alone.names]
+    own = [alone.names.index(joint.names[k]) for k in at]
+    other = [k for k in range(len(joint.names)) if k not in at]
+    for mine, theirs in ((x, alone.x), (u, alone.u), (U, alone.U), (dof, alone.dof)):
+        mine[at] = theirs[own]
+    C[np.ix_(at, at)] = alone.covariance[np.ix_(own, own)]
+    C[np.ix_(at, other)] = C[np.ix_(other, at)] = 0.0
+    gyro = {name for k in other for name in [joint.names[k]]}
+    return replace(
+        joint,
+        x=x,
+        u=u,
+        U=U,
+        dof=dof,
+        covariance=C,
+        by_prior=(*alone.by_prior, *(name for name in joint.by_prior if name in gyro)),
+        leaning=(*alone.leaning, *(name for name in joint.leaning if name in gyro)),
+        residuals=np.concatenate([alone.residuals[:, :2], joint.residuals[:, 2:]], axis=1),
+    )
