@@ -87,7 +87,7 @@ class Proposal:
         StudyError
             A row names another file, or the rows of a table of means are more or fewer than its own.
         """
-        files = {name: _recorded(name, record) for name, record in records.items()}
+        files = {name: RecordedTriads.of(name, record) for name, record in records.items()}
         only = next(iter(files)) if len(files) == 1 else ""
         rows = [replace(row, file=row.file or only) for row in rows]
         for row in rows:
@@ -108,7 +108,7 @@ class Proposal:
                         f"found {count} rows of means, but {len(mine)} sections, expected one for each row",
                     )
                 sections += sections_of_means(mine, table)
-        recorded = {n: (f.acc, f.gyro) for n, f in files.items() if not is_counted(f.record)}
+        recorded = {name: file for name, file in files.items() if not is_counted(file.record)}
         done = cut(stretches_of(rows, recorded))
         sections += done.sections
         scales = {_scale(file.record) for file in files.values() if file.gyro is not None}
