@@ -139,12 +139,14 @@ def _taken(function: F, inline: Literal["never", "always"], counting: bool, forc
 
 
 def _entry(function: F, code: Callable[..., Any], unfit: type[Exception]) -> F:
-    """Machine code, beside the plain function for arguments of other types."""
+    """Machine code, beside the plain function for arguments of other types; a NamedTuple comes back as one."""
+    named = function.__globals__.get(str(function.__annotations__.get("return")))  # type: ignore[attr-defined]
+    named = named if hasattr(named, "_fields") else None
 
     @functools.wraps(function)
     def entry(*arguments: Any) -> Any:
         try:
-            return code(*arguments)
+            return code(*arguments) if named is None else named(*code(*arguments))
         except unfit:
             _say_unfit(f"{function.__module__}.{function.__name__}", types_of(arguments))
         return function(*arguments)
