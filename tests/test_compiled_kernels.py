@@ -85,7 +85,7 @@ def python(program, path=entries.SOURCE, **environment):
 
 
 KERNEL = """
-from tiny.foundation._jit import kernel
+from inercal.foundation._jit import kernel
 @kernel
 def twice(x):
     return 2.0 * x
@@ -96,22 +96,24 @@ class Unfit(TypeError): ...
 def twice(x):
     if not isinstance(x, float): raise Unfit
     return "compiled"
-ALL, FILES, SOURCES = {"tiny.room.twice": twice}, "room.py\\n", "@"
+ALL, FILES, SOURCES = {"inercal.room.twice": twice}, "room.py\\n", "@"
 """
 
 
 @pytest.fixture
 def tiny(tmp_path):
     """A package with a kernel, and a module that stands for its machine code."""
-    (tmp_path / "tiny" / "foundation").mkdir(parents=True)
-    shutil.copy(_jit.__file__, tmp_path / "tiny" / "foundation")
-    (tmp_path / "tiny" / "room.py").write_text(KERNEL)
-    digest = entries.digest(tmp_path / "tiny", ["room.py"])
-    (tmp_path / "tiny" / "_kernels.py").write_text(CODE.replace("@", digest))
+    (tmp_path / "inercal" / "foundation").mkdir(parents=True)
+    for folder in ("", "foundation"):
+        (tmp_path / "inercal" / folder / "__init__.py").touch()
+    shutil.copy(_jit.__file__, tmp_path / "inercal" / "foundation")
+    (tmp_path / "inercal" / "room.py").write_text(KERNEL)
+    digest = entries.digest(tmp_path / "inercal", ["room.py"])
+    (tmp_path / "inercal" / "_kernels.py").write_text(CODE.replace("@", digest))
     return tmp_path
 
 
-PRINT = "from tiny.room import twice; print(twice(3.0), twice({}))"
+PRINT = "from inercal.room import twice; print(twice(3.0), twice({}))"
 
 
 def test_machine_code_is_used_while_its_sources_are_the_same(tiny):
@@ -119,7 +121,7 @@ def test_machine_code_is_used_while_its_sources_are_the_same(tiny):
 
 
 def test_stale_machine_code_is_never_used_and_said_once(tiny):
-    (tiny / "tiny" / "room.py").write_text(KERNEL.replace("2.0", "5.0") + KERNEL.replace("twice", "again"))
+    (tiny / "inercal" / "room.py").write_text(KERNEL.replace("2.0", "5.0") + KERNEL.replace("twice", "again"))
     found, said = python("import sys; sys.modules['numba'] = None\n" + PRINT.format("4.0"), tiny)
     assert found == "15.0 20.0"
     assert said.count("kernels have changed since they were compiled") == 1
@@ -129,7 +131,7 @@ def test_stale_machine_code_is_never_used_and_said_once(tiny):
 def test_arguments_of_other_types_are_computed_all_the_same_with_a_warning_or_refused(tiny):
     found, said = python(PRINT.format("4"), tiny)
     assert found == "compiled 8.0"
-    assert "tiny.room.twice is not compiled for arguments of the types i" in said
+    assert "inercal.room.twice is not compiled for arguments of the types i" in said
     with pytest.raises(AssertionError, match="not compiled for arguments of the types i"):
         python(PRINT.format("4"), tiny, INERCAL_KERNELS="compiled")
 

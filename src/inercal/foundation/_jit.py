@@ -1,7 +1,7 @@
 """The one door to compiled kernels.
 
 A kernel is plain Python. Those that Python calls are compiled when the wheel is built, or by `make kernels`, into
-`inercal._kernels`, a module of machine code that needs no compiler: `kernel` and its siblings put its functions in the
+``_kernels``, a module of machine code that needs no compiler: `kernel` and its siblings put its functions in the
 place of theirs, where the sources are still those that it was made from. Where it is absent, numba compiles kernels as
 they are called (the extra `jit`), or they run as plain Python, which is slow.
 
@@ -18,7 +18,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from importlib import import_module, util
+from importlib import util
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NoReturn, TypeVar, cast
 
@@ -33,12 +33,9 @@ WAYS = ("compiled", "numba", "python")
 
 _HOW_TO = "`make kernels` compiles all in a checkout, a wheel holds them"
 
-_SECONDS = {"selfcal": 30, "campaign": 30, "validate": 60, "aoa": 15, "strapdown": 15, "sensitivity": 8}
-"""What numba takes for the kernels of a command of these words [s]; of others a few."""
-
 
 class Way(NamedTuple):
-    """``how`` kernels run in this process, one of `WAYS`; the ``module`` of machine code; ``why`` there is none."""
+    """A way for kernels to run: ``how``, one of `WAYS`; the ``module`` of machine code; ``why`` there is none."""
 
     how: str
     module: Any = None
@@ -56,7 +53,10 @@ def source_hash(package: Path = PACKAGE) -> str:
 
 @functools.cache
 def way() -> Way:
-    """How kernels run in this process; raises `InputError` where INERCAL_KERNELS asks for what is not there."""
+    """The way in which kernels run in this process.
+
+    Raises `InputError` where INERCAL_KERNELS asks for what is not there.
+    """
     asked = os.environ.get(CHOICE, "")
     if asked not in ("", *WAYS):
         _refuse(f"found {asked!r}, expected one of {', '.join(WAYS)}")
@@ -80,11 +80,12 @@ def _refuse(text: str) -> NoReturn:
 
 
 def _machine_code() -> tuple[Any, str]:
-    """`inercal._kernels`; or None, and why. It tells once that it is not used where the sources have changed."""
+    """``_kernels``; or None, and why. It tells once that it is not used where the sources have changed."""
     try:
-        module = import_module(f"{PACKAGE.name}._kernels")
+        from inercal import _kernels  # type: ignore[attr-defined]
     except ImportError:
         return None, "kernels are not compiled"
+    module: Any = _kernels
     digest = hashlib.sha256()
     with suppress(OSError):
         for file in module.FILES.split():
@@ -124,9 +125,9 @@ def merged(function: F) -> F:
     return _taken(function, "never", counting=False, forced=True)
 
 
-def plain(kernel: F) -> F:
+def plain(kernel: Any) -> Any:
     """A kernel as plain Python, which may be given arrays for numbers."""
-    return cast(F, getattr(kernel, "py_func", getattr(kernel, "__wrapped__", kernel)))
+    return getattr(kernel, "py_func", getattr(kernel, "__wrapped__", kernel))
 
 
 def _taken(function: F, inline: Literal["never", "always"], counting: bool, forced: bool = False) -> F:
@@ -140,7 +141,7 @@ def _taken(function: F, inline: Literal["never", "always"], counting: bool, forc
 
 def _entry(function: F, code: Callable[..., Any], unfit: type[Exception]) -> F:
     """Machine code, beside the plain function for arguments of other types; a NamedTuple comes back as one."""
-    named = function.__globals__.get(str(function.__annotations__.get("return")))  # type: ignore[attr-defined]
+    named = function.__globals__.get(str(function.__annotations__.get("return")))
     named = named if hasattr(named, "_fields") else None
 
     @functools.wraps(function)
@@ -265,8 +266,7 @@ def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
     if how == "python":
         say(f"{first}kernels run as plain Python, a hundred times slower; {_HOW_TO}")
     elif how == "numba" and (done is None or not done.exists()):
-        seconds = _SECONDS.get(name.split()[0], 5)
-        say(f"{first}compiling takes some {seconds} s, once; {_HOW_TO}")
+        say(f"{first}compiling those of this command takes 5 to 40 s, once; {_HOW_TO}")
     yield
     if done is not None:
         with suppress(OSError):  # it would be said once more
