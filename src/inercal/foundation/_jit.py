@@ -82,7 +82,7 @@ def _refuse(text: str) -> NoReturn:
 def _machine_code() -> tuple[Any, str]:
     """``_kernels``; or None, and why. It tells once that it is not used where the sources have changed."""
     try:
-        from inercal import _kernels  # type: ignore[attr-defined]
+        from inercal import _kernels
     except ImportError:
         return None, "kernels are not compiled"
     module: Any = _kernels
