@@ -1,4 +1,4 @@
-# The commands a newcomer needs: `make demo`, and `make quick` and `make test`. Each makes its own environment.
+# The commands a newcomer needs: `make demo` and `make kernels`, `make quick` and `make test`. Each makes its own environment.
 PYTHON ?= python3
 RUN := .venv/run/bin
 DEV := .venv/dev/bin
@@ -7,7 +7,7 @@ DEMO := build/demo
 # Where it is set, each of the many processes of the tests would parse every module again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo workbench quick test campaign coverage docs bench lock clean
+.PHONY: demo kernels wheel workbench quick test campaign coverage docs bench lock clean
 
 demo: .venv/run/installed
 	rm -rf $(DEMO)
@@ -15,6 +15,16 @@ demo: .venv/run/installed
 	$(RUN)/inercal calibrate imu $(DEMO)/xsens_acc.mat $(DEMO)/xsens_gyro.mat \
 	    --map $(DEMO)/xsens-map.toml --study $(DEMO)/xsens.toml \
 	    --out $(DEMO)/calibration.json --report $(DEMO)/report.html
+	@ls src/inercal/_kernels.* >/dev/null 2>&1 || echo "selfcal, aoa and strapdown need compiled kernels: make kernels (a minute, once)"
+
+# Compiled for this machine's kind of processor, unless nothing they rest on has changed; done again after an update.
+COMPILER = $(if $(wildcard .venv/dev/installed),.venv/dev,.venv/kernels)
+kernels: $(COMPILER)/installed
+	@$(COMPILER)/bin/python kernels/build.py --in-place
+
+# One for this platform and all Pythons from 3.11, in dist; it needs neither a compiler nor numba where it is installed.
+wheel: $(COMPILER)/installed
+	$(COMPILER)/bin/python -m hatchling build -t wheel -d dist
 
 # In the browser; sessions and jobs lie in build/workbench.
 workbench: .venv/workbench/installed
@@ -31,20 +41,23 @@ quick: .venv/dev/installed
 test: .venv/dev/installed
 	$(DEV)/ruff format --check .
 	$(DEV)/ruff check .
+	@$(DEV)/python kernels/build.py --in-place
 	@$(DEV)/mypy & types=$$!; $(DEV)/python -m pytest --collect-only -m "not campaign" >/dev/null; \
 	    $(DEV)/python -m pytest -n 3 --dist worksteal -m "not campaign" --slow-rule list; \
 	    tests=$$?; wait $$types && exit $$tests
 
-# The full numbers of runs, of which `make test` has short versions.
+# The full numbers of runs, of which `make test` has short versions; and tests of kernels as numba compiles them.
 campaign: .venv/dev/installed
+	$(DEV)/python kernels/build.py --in-place
 	$(DEV)/python -m pytest -n 2 --dist worksteal -m campaign
 	$(DEV)/python -m pytest -n 2 --dist worksteal -m "hypothesis and not campaign" --hypothesis-profile thorough
+	INERCAL_KERNELS=numba $(DEV)/python -m pytest -n 2 --dist worksteal -m kernels
 
 # Compiled lines cannot be counted: short tests of kernels run once more with kernels as plain Python.
 coverage: .venv/dev/installed
 	rm -rf build/coverage
 	$(DEV)/coverage run -m pytest -n 2 --dist worksteal -m "not campaign"
-	NUMBA_DISABLE_JIT=1 $(DEV)/coverage run -m pytest -n 2 --dist worksteal -m kernels
+	INERCAL_KERNELS=python $(DEV)/coverage run -m pytest -n 2 --dist worksteal -m kernels
 	$(DEV)/coverage combine --quiet
 	$(DEV)/coverage report
 
@@ -60,6 +73,7 @@ bench: .venv/dev/installed
 # them, each with every second package.
 .venv/run/installed: requirements/run.txt pyproject.toml
 .venv/dev/installed: requirements/dev.txt pyproject.toml
+.venv/kernels/installed: requirements/kernels.txt pyproject.toml
 .venv/workbench/installed: requirements/workbench.txt pyproject.toml
 .venv/%/installed:
 	$(PYTHON) -m venv --clear .venv/$*
@@ -78,6 +92,8 @@ lock:
 	    --extra workbench pyproject.toml requirements/build.in -o requirements/workbench.txt
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
 	    --group dev pyproject.toml requirements/build.in -o requirements/dev.txt
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+	    --group kernels requirements/build.in -o requirements/kernels.txt
 
 clean:
 	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

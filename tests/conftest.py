@@ -11,10 +11,16 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from inercal.foundation._jit import CHOICE, cache_folder, way
+
 # As the commands do, before NumPy is imported: the matrices are small, and threads of two workers wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 gc.set_threshold(50_000, 20, 20)  # as the commands do
+
+# Compiled kernels, where they are those of these sources, and then nothing else: a call that they were not compiled for
+# fails, here and in the processes that tests start. Otherwise numba compiles kernels as tests call them.
+os.environ.setdefault(CHOICE, way().how)
 
 LIMIT = 2.0
 """Processor time that a test may take without the mark `slow` or `campaign` [s], on a machine of `YARDSTICK`."""
@@ -54,8 +60,8 @@ def yardstick():
 
 def compiled_since(moment):
     """True if any process has compiled a kernel since."""
-    from inercal.foundation._jit import cache_folder
-
+    if way().how != "numba":
+        return False
     folder = cache_folder()
     return folder is None or any(path.stat().st_mtime >= moment for path in folder.rglob("*"))
 
@@ -97,6 +103,12 @@ def undrawn():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(FigureCanvasSVG, "print_svg", empty)
         yield
+
+
+def pytest_report_header():
+    """How kernels run."""
+    how, _, why = way()
+    return f"kernels: {how}" + (f", for {why}: `make kernels`" if why else "")
 
 
 def pytest_collection_modifyitems(config, items):

@@ -1,4 +1,4 @@
-"""Promises of the kernel decorator: never stale, never in the way, compiled once.
+"""Promises of the kernel decorator where numba compiles as kernels are called: never stale, never in the way, once.
 
 Each test runs other processes, on a copy of the package where sources change, since a cache lives between
 processes and not in one.
@@ -9,7 +9,6 @@ import builtins
 import importlib
 import inspect
 import os
-import pkgutil
 import shutil
 import subprocess
 import sys
@@ -17,11 +16,12 @@ import textwrap
 import typing
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
 import inercal
+from entries import Sources
+from inercal.foundation._jit import plain
 
 PACKAGE = Path(inercal.__file__).parent
 NOWHERE = "/dev/null/nowhere"  # below a file: nobody can make it, not even root
@@ -30,6 +30,7 @@ NOWHERE = "/dev/null/nowhere"  # below a file: nobody can make it, not even root
 def python(program, *, path=PACKAGE.parent, **environment):
     """Run a program in a new process with ``path`` as its package folder; what it printed."""
     kept = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")}
+    kept["INERCAL_KERNELS"] = "numba"
     run = subprocess.run(
         [sys.executable, "-c", program],
         env=kept | {"PYTHONPATH": str(path)} | {key: str(value) for key, value in environment.items()},
@@ -107,9 +108,10 @@ def test_where_nothing_can_be_written_kernels_work_without_a_cache(gettempdir):
 def test_kernels_run_as_plain_python_too():
     """For debuggers and coverage, which do not see compiled bodies."""
     program = """
+import sys
 import numpy as np
 from inercal.foundation.geometry import kernels, rotations
-assert not hasattr(kernels.step, "stats")
+assert not hasattr(kernels.integrate, "machine_code") and "numba" not in sys.modules
 rng = np.random.default_rng(4)
 q0, omega = rotations.normalize(rng.normal(size=4)), rng.normal(size=(9, 3))
 dt, out = np.full(9, 0.1), np.empty((10, 4))
@@ -119,23 +121,15 @@ np.testing.assert_allclose(out[1:], rotations.step(out[:-1], omega, dt), atol=1e
 np.testing.assert_allclose(kernels.rotate(q0, omega[0]), rotations.rotate(q0, omega[0]), atol=1e-15)
 print("same")
 """
-    assert python(program, NUMBA_DISABLE_JIT=1) == "same"
+    assert python(program, INERCAL_KERNELS="python") == "same"
 
 
 def kernels():
-    """All kernels of the package, with their names."""
-    found = {}
-    for module in pkgutil.walk_packages(inercal.__path__, "inercal."):
-        if "__main__" in module.name or "migrations" in module.name:  # which do something when imported
-            continue
-        try:
-            names = vars(importlib.import_module(module.name))
-        except ModuleNotFoundError:  # of an extra
-            continue
-        for name, value in names.items():
-            if isinstance(value, numba.core.registry.CPUDispatcher):
-                found[value] = f"{value.py_func.__module__}.{name}"
-    return found
+    """All kernels of the package as plain Python, with the names of their decorators."""
+    return {
+        plain(getattr(importlib.import_module(module), name)): {each.id for each in node.decorator_list}
+        for (module, name), node in Sources().kernels.items()
+    }
 
 
 def of_arrays(kind):
@@ -148,19 +142,15 @@ def of_arrays(kind):
     return any(map(of_arrays, fields))
 
 
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are plain functions here")
 def test_kernels_that_count_no_references_are_handed_no_new_arrays():
     """An array that such a kernel returned would be freed twice, one that it got from another never."""
     every = kernels()
-    returning = {each for each in every if of_arrays(typing.get_type_hints(each.py_func)["return"])}
-    plain = [each for each in every if not each.targetoptions["_nrt"]]
-    assert len(plain) > 150
-    for each in plain:
-        assert each not in returning, every[each]
-        for call in calls(each.py_func):
-            assert may_be_called(call, each.py_func.__globals__, returning), (
-                f"{every[each]} calls {ast.unparse(call)}"
-            )
+    uncounted = [each for each, decorators in every.items() if "allocating" not in decorators]
+    assert len(uncounted) > 150
+    for each in uncounted:
+        assert not of_arrays(typing.get_type_hints(each)["return"]), each
+        for call in calls(each):
+            assert may_be_called(call, each.__globals__), f"{each} calls {ast.unparse(call)}"
 
 
 def calls(function):
@@ -173,22 +163,21 @@ SCALARS = {"float64", "int64", "uint64"}
 IN_PLACE = {"fill", "all"}
 
 
-def may_be_called(call, names, returning):
+def may_be_called(call, names):
     """True if what is called makes no array: a kernel that returns none, a function of numbers, a tuple of numbers."""
     if isinstance(call, ast.Attribute):
         of = call.value.id if isinstance(call.value, ast.Name) else ""
         return of == "math" or (of == "np" and call.attr in SCALARS) or (of != "np" and call.attr in IN_PLACE)
     name = call.id if isinstance(call, ast.Name) else ""
-    found = names.get(name, getattr(builtins, name, None))
-    if isinstance(found, numba.core.registry.CPUDispatcher):
-        return found not in returning
+    found = plain(names.get(name, getattr(builtins, name, None)))
+    if inspect.isfunction(found) and found.__module__.startswith("inercal."):
+        return not of_arrays(typing.get_type_hints(found)["return"])
     return found in {abs, min, max, len, range, int, float, bool, round, divmod} or (
         isinstance(found, type) and issubclass(found, tuple) and not of_arrays(found)
     )
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are plain functions here")
+@pytest.mark.campaign
 def test_kernels_free_what_they_make():
     """After the shipped examples of a platform and of a tunnel no array that a kernel made is left."""
     program = """

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import inercal
+from inercal.foundation._jit import way
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(inercal.__file__).parent
@@ -39,7 +41,11 @@ def built(tmp_path_factory) -> tuple[Path, Path]:
     with tarfile.open(archive) as whole:
         whole.extractall(folder, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))
     unpacked = folder / archive.name.removesuffix(".tar.gz")
-    run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=unpacked)
+    if way().how == "compiled":  # not once more
+        shutil.copytree(ROOT / "build" / "kernels", unpacked / "build" / "kernels")
+    how = "" if way().how == "compiled" else "python"
+    wheel = (sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder)
+    run(*wheel, cwd=unpacked, INERCAL_KERNELS=how)
     (wheel,) = folder.glob("*.whl")
     return archive, wheel
 
@@ -74,7 +80,7 @@ def test_the_source_archive_is_enough_to_test_and_document(built):
     with tarfile.open(built[0]) as whole:
         names = {name.partition("/")[2] for name in whole.getnames()}
     tracked = {"README.md", "Makefile", "pyproject.toml", "requirements/dev.txt", "CHANGES.md", "LICENSE"}
-    folders = ("src", "tests", "docs", "benchmarks")
+    folders = ("src", "kernels", "tests", "docs", "benchmarks")
     wanted = {
         path.relative_to(ROOT).as_posix()
         for folder in folders
@@ -96,6 +102,7 @@ def test_the_metadata_say_what_a_user_of_an_index_asks(built):
     ):
         assert line in text
     assert "Requires-Dist: numpy>=" in text
+    assert all("extra == 'jit'" in line for line in text.splitlines() if "Requires-Dist: numba" in line)
     assert "# inercal" in text, "the README is the page of the project"
 
 

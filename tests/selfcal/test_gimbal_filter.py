@@ -86,7 +86,7 @@ def test_a_step_is_of_its_order_in_time(euler, order):
     th, w = np.array([0.4, -0.6, 0.9]), np.array([0.5, -0.4, 0.7])
     start = joints(th[None], world)[0][0]
     q = multiply(multiply(exp(-world.earth), start), exp(w))
-    exact = np.array(angles(tuple(q), th, world.axes, world.signs))
+    exact = np.array(angles(q, th, world.axes, world.signs))
     errors = []
     for steps in (64, 128):
         at = th.copy()

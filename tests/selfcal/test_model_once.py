@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import inercal.systems.selfcal
+from inercal.foundation._jit import plain
 
 FOLDER = Path(inercal.systems.selfcal.__file__).parent
 KERNELS = ("kernel", "merged", "inlined", "allocating")
@@ -67,7 +68,7 @@ def test_no_kernel_returns_an_array():
     wrong = []
     for module, decorator, node in compiled():
         function = getattr(import_module(module), node.name)
-        hints = typing.get_type_hints(getattr(function, "py_func", function))
+        hints = typing.get_type_hints(plain(function))
         if decorator != "allocating" and holds_array(hints["return"]):
             wrong.append(f"{module}.{node.name}")
     assert wrong == []

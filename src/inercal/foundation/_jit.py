@@ -1,8 +1,12 @@
-"""The one decorator for compiled kernels.
+"""The one door to compiled kernels.
 
-numba's own disk cache is keyed on the file that holds the kernel, not on the kernels it calls: after an
-upgrade that changes only a callee, a cached caller would silently go on with the old numbers. So the
-cache folder carries a hash over every source file of the package, and any change starts a fresh one.
+A kernel is plain Python. Those that Python calls are compiled when the wheel is built, or by `make kernels`, into
+``_kernels``, a module of machine code that needs no compiler: `kernel` and its siblings put its functions in the
+place of theirs, where the sources are still those that it was made from. Where it is absent, numba compiles kernels as
+they are called (the extra `jit`), or they run as plain Python, which is slow.
+
+INERCAL_KERNELS chooses by hand: `compiled` takes nothing else, and refuses arguments of types that no machine code is
+there for; `numba`; `python`.
 """
 
 from __future__ import annotations
@@ -11,17 +15,31 @@ import functools
 import hashlib
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib import util
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
-
-import numba
-import numba.core.config
+from typing import Any, Literal, NamedTuple, NoReturn, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 PACKAGE = Path(__file__).resolve().parents[1]
+
+CHOICE = "INERCAL_KERNELS"
+"""Variable of the environment that says how kernels run: one of `WAYS`; the first that is there without it."""
+
+WAYS = ("compiled", "numba", "python")
+
+_HOW_TO = "`make kernels` compiles all in a checkout, a wheel holds them"
+
+
+class Way(NamedTuple):
+    """A way for kernels to run: ``how``, one of `WAYS`; the ``module`` of machine code; ``why`` there is none."""
+
+    how: str
+    module: Any = None
+    why: str = ""
 
 
 def source_hash(package: Path = PACKAGE) -> str:
@@ -33,8 +51,147 @@ def source_hash(package: Path = PACKAGE) -> str:
     return digest.hexdigest()
 
 
+@functools.cache
+def way() -> Way:
+    """The way in which kernels run in this process.
+
+    Raises `InputError` where INERCAL_KERNELS asks for what is not there.
+    """
+    asked = os.environ.get(CHOICE, "")
+    if asked not in ("", *WAYS):
+        _refuse(f"found {asked!r}, expected one of {', '.join(WAYS)}")
+    why = ""
+    if asked in ("", "compiled"):
+        module, why = _machine_code()
+        if module is not None:
+            return Way("compiled", module)
+        if asked:
+            _refuse(f"found {asked}, but {why}: {_HOW_TO}")
+    has_numba = util.find_spec("numba") is not None
+    if asked == "numba" and not has_numba:
+        _refuse("found numba, which is not installed: it is the extra `jit`")
+    return Way(asked or ("numba" if has_numba else "python"), None, why)
+
+
+def _refuse(text: str) -> NoReturn:
+    from inercal.foundation.errors import InputError
+
+    raise InputError(CHOICE, text)
+
+
+def _machine_code() -> tuple[Any, str]:
+    """``_kernels``; or None, and why. It tells once that it is not used where the sources have changed."""
+    try:
+        from inercal import _kernels
+    except ImportError:
+        return None, "kernels are not compiled"
+    module: Any = _kernels
+    digest = hashlib.sha256()
+    with suppress(OSError):
+        for file in module.FILES.split():
+            digest.update((PACKAGE / file).read_bytes() + b"\0")
+        if digest.hexdigest() == module.SOURCES:
+            return module, ""
+    why = "kernels have changed since they were compiled"
+    if not os.environ.get(CHOICE):
+        warnings.warn(f"{why}: what was compiled is not used; {_HOW_TO}", RuntimeWarning, stacklevel=2)
+    return None, why
+
+
+def kernel(function: F) -> F:
+    """A kernel, compiled without the GIL (nopython, no fastmath).
+
+    It counts no references to arrays, which took up to a third of a filter's time. So it must not make an array (nor
+    call functions of NumPy that do, such as ``np.median``), nor return one, alone or in a tuple, nor call a kernel that
+    returns one: numba does not always notice, and memory is lost or freed too soon. Such a kernel is `allocating`.
+    What Python calls fills arrays that it is given, and returns numbers or tuples of them.
+    """
+    return _taken(function, "never", counting=False)
+
+
+def allocating(function: F) -> F:
+    """A kernel that makes arrays, or gets them from one that does, and counts the references to them."""
+    return _taken(function, "never", counting=True)
+
+
+def inlined(function: F) -> F:
+    """A kernel for one or two others, into which it is put: they compile sooner than with it beside them."""
+    return _taken(function, "always", counting=False)
+
+
+def merged(function: F) -> F:
+    """A kernel whose machine code becomes part of each caller's: for one that takes many arrays, since each costs seven
+    words at a call."""
+    return _taken(function, "never", counting=False, forced=True)
+
+
+def plain(kernel: Any) -> Any:
+    """A kernel as plain Python, which may be given arrays for numbers."""
+    return getattr(kernel, "py_func", getattr(kernel, "__wrapped__", kernel))
+
+
+def _taken(function: F, inline: Literal["never", "always"], counting: bool, forced: bool = False) -> F:
+    """The function as it runs in this process."""
+    how, module, _ = way()
+    if how == "numba":
+        return _jitted(function, inline, counting, forced)
+    code = module.ALL.get(f"{function.__module__}.{function.__name__}") if module else None
+    return function if code is None else _entry(function, code, module.Unfit)
+
+
+def _entry(function: F, code: Callable[..., Any], unfit: type[Exception]) -> F:
+    """Machine code, beside the plain function for arguments of other types; a NamedTuple comes back as one."""
+    named = function.__globals__.get(str(function.__annotations__.get("return")))
+    named = named if hasattr(named, "_fields") else None
+
+    @functools.wraps(function)
+    def entry(*arguments: Any) -> Any:
+        try:
+            return code(*arguments) if named is None else named(*code(*arguments))
+        except unfit:
+            _say_unfit(f"{function.__module__}.{function.__name__}", types_of(arguments))
+        return function(*arguments)
+
+    entry.machine_code = code  # type: ignore[attr-defined]
+    return cast(F, entry)
+
+
+def _say_unfit(name: str, types: str) -> None:
+    """Warn that a call is slow, or refuse it where nothing but machine code is asked for."""
+    text = f"{name} is not compiled for arguments of the types {types}"
+    if os.environ.get(CHOICE):
+        raise TypeError(text)
+    warnings.warn(f"{text}: it runs as plain Python, slowly", RuntimeWarning, stacklevel=3)
+
+
+def types_of(arguments: tuple[Any, ...]) -> str:
+    """Types of arguments as machine code is looked up by them, one after the other.
+
+    f, i and b are a float, an integer and a bool; ``(ff)`` is a tuple. Of an array: the letter of its items (d float64,
+    q int64, w int32, Q uint64, B uint8, ? bool, x any other), its number of axes, F or A where it is not contiguous in
+    rows but in columns, or not at all, and R where it cannot be written.
+    """
+    import numpy as np
+
+    letters = {"f8": "d", "i8": "q", "i4": "w", "u8": "Q", "u1": "B", "b1": "?"}
+
+    def one(value: Any) -> str:
+        if isinstance(value, tuple):
+            return f"({types_of(value)})"
+        if isinstance(value, np.ndarray):
+            flags = value.flags
+            letter = letters.get(value.dtype.str[1:], "x") if value.dtype.isnative else "x"
+            layout = "" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+            return f"{letter}{value.ndim}{layout}{'' if flags.writeable else 'R'}"
+        if isinstance(value, bool | np.bool_):
+            return "b"
+        return "i" if isinstance(value, int | np.integer) else "f"
+
+    return "".join(map(one, arguments))
+
+
 def _user_caches() -> Iterator[Path]:
-    """Places for the cache, best first: the user's cache folder, then a private temporary one."""
+    """Places for numba's cache, best first: the user's cache folder, then a private temporary one."""
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     with suppress(RuntimeError):  # no home directory
         yield (Path(base) if base else Path.home() / ".cache") / "inercal"
@@ -59,7 +216,11 @@ def _usable(folder: Path) -> bool:
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """Folder of the compiled kernels of exactly these sources, or None where nothing can be written."""
+    """Folder of what numba compiled of exactly these sources, or None where nothing can be written.
+
+    numba's own cache is keyed on the file that holds the kernel, not on the kernels it calls: a cached caller would go
+    on with the old numbers. So the folder carries a hash over every source file of the package.
+    """
     key = source_hash()
     for base in _user_caches():
         if _usable(base) and _usable(base / key):
@@ -67,34 +228,11 @@ def cache_folder() -> Path | None:
     return None
 
 
-def kernel(function: F) -> F:
-    """Compile a function with numba (nopython, no GIL, no fastmath), cached on disk where possible.
+def _jitted(function: F, inline: Literal["never", "always"], counting: bool, forced: bool) -> F:
+    """The function as numba compiles it when it is first called, cached on disk where possible."""
+    import numba
+    import numba.core.config
 
-    It counts no references to arrays, which took up to a third of a filter's time. So it must not make an array (nor
-    call functions of NumPy that do, such as ``np.median``), nor return one, alone or in a tuple, nor call a kernel that
-    returns one: numba does not always notice, and memory is lost or freed too soon. Such a kernel is `allocating`.
-    """
-    return _compiled(function, "never", counting=False)
-
-
-def allocating(function: F) -> F:
-    """A kernel that makes arrays, or gets them from one that does, and counts the references to them."""
-    return _compiled(function, "never", counting=True)
-
-
-def inlined(function: F) -> F:
-    """A kernel for one or two others, into which it is put: they compile sooner than with it beside them."""
-    return _compiled(function, "always", counting=False)
-
-
-def merged(function: F) -> F:
-    """A kernel whose machine code becomes part of each caller's: for one that takes many arrays, since each costs seven
-    words at a call."""
-    return _compiled(function, "never", counting=False, forced=True)
-
-
-def _compiled(function: F, inline: Literal["never", "always"], counting: bool, forced: bool = False) -> F:
-    """The function as numba compiles it when it is first called."""
     folder = cache_folder()
     config = cast(Any, numba.core.config)
     before = config.CACHE_DIR
@@ -111,17 +249,24 @@ def _compiled(function: F, inline: Literal["never", "always"], counting: bool, f
 def compiled(kernel: F, *arguments: Any) -> F:
     """The machine code of a kernel for arguments of these types: calling it skips the look at their types, several
     microseconds for NamedTuples of arrays; the caller keeps to the types."""
-    compile_for = getattr(kernel, "compile", None)  # none where compiling is turned off
-    return kernel if compile_for is None else cast(F, compile_for(tuple(map(numba.typeof, arguments))))
+    if way().how == "numba":
+        import numba
+
+        return cast(F, cast(Any, kernel).compile(tuple(map(numba.typeof, arguments))))
+    return cast(F, getattr(kernel, "machine_code", kernel))
 
 
 @contextmanager
 def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
-    """Surround the tiny first calls of a system's kernels; says so once when they must be compiled."""
-    folder = cache_folder()
+    """Surround the tiny first calls of a system's kernels; says so once when they must be compiled, or are slow."""
+    how, _, why = way()
+    folder = cache_folder() if how == "numba" else None
     done = None if folder is None else folder / f"{name}.compiled"
-    if done is None or not done.exists():
-        say("compiling kernels, once")
+    first = f"{why}: " if why else ""
+    if how == "python":
+        say(f"{first}kernels run as plain Python, a hundred times slower; {_HOW_TO}")
+    elif how == "numba" and (done is None or not done.exists()):
+        say(f"{first}compiling those of this command takes 5 to 40 s, once; {_HOW_TO}")
     yield
     if done is not None:
         with suppress(OSError):  # it would be said once more

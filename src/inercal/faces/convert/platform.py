@@ -23,11 +23,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from inercal.faces.convert.correction import Correction, Samples, factor_of, one_clock
+from inercal.foundation._jit import plain
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
@@ -122,9 +122,9 @@ class RigPlatform:
         """The part of the rate beside that of the triad, by the quantities in the order of the table."""
         from inercal.systems.selfcal.platform.model import (
             rate_quantities,
-        )  # loads numba, which most corrections do without
+        )  # loads kernels, which most corrections do without
 
-        quantities = _plain(rate_quantities)(_axes(rate), _axes(force), warm)
+        quantities = plain(rate_quantities)(_axes(rate), _axes(force), warm)
         return _total(self.rate[:, _LINEAR:], quantities[_LINEAR:])
 
     def _beside_output(self, s: Array, warm: Array) -> Array:
@@ -132,7 +132,7 @@ class RigPlatform:
         from inercal.systems.selfcal.platform.model import output_quantities
 
         by = s / self.accelerometer.scale
-        return _total(self.output, _plain(output_quantities)(_axes(s), _axes(by), warm))
+        return _total(self.output, plain(output_quantities)(_axes(s), _axes(by), warm))
 
     def unbent(self, v: Array, force: Array) -> Array:
         """A vector (*batch, 3) of p in the axes of the unbent platform; ``force`` (*batch, 3) [m/s^2] in p."""
@@ -148,11 +148,6 @@ class RigPlatform:
         for _ in range(_ROUNDS):
             force = self.bent(unbent, force)
         return force
-
-
-def _plain(kernel: Any) -> Any:
-    """A kernel as plain Python, which takes arrays as well."""
-    return getattr(kernel, "py_func", kernel)
 
 
 def _axes(v: Array) -> list[Array]:

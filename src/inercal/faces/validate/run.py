@@ -1,7 +1,6 @@
 """All cases of the validation: run, judged, and put into one estimate without parameters.
 
-The systems share two processes. Nearly all of the first run is compiling, which no two threads can do at a time; the
-kernels are then kept on disk.
+The systems share two processes: where kernels are compiled meanwhile, no two threads can do it at a time.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from inercal import __version__
 from inercal.examples import EXAMPLES, shipped
 from inercal.faces.validate import foundation
 from inercal.faces.validate.case import SOURCES, USED, Case, Numbers, Outcome, find, judge
-from inercal.foundation._jit import source_hash
+from inercal.foundation._jit import source_hash, way
 from inercal.foundation.computing.executors import Executor, Processes, Serial
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.results.basis import Basis
@@ -32,7 +31,7 @@ SYSTEMS: Mapping[str, str] = {
 }
 """Groups of cases, in the order of the floors, and what they are about."""
 
-_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
+_LIBRARIES = ("numpy", "scipy")
 
 
 def cases_of(system: str) -> Sequence[Case]:
@@ -124,11 +123,12 @@ def _finding(row: Mapping[str, Any]) -> Finding:
 
 
 def _versions() -> dict[str, str]:
-    """Versions of the package, of Python, and of the libraries that compute."""
+    """Versions of the package, of Python, and of the libraries that compute; and how kernels run."""
     return {
         "inercal": __version__,
         "python": platform.python_version(),
         **{name: version(name) for name in _LIBRARIES},
+        "kernels": f"numba {version('numba')}" if way().how == "numba" else way().how,
     }
 
 

@@ -27,7 +27,7 @@ from inercal.foundation.designs.search import from_starts
 from inercal.foundation.errors import InputError
 
 if TYPE_CHECKING:
-    from inercal.foundation.designs.exchange_kernel import DesignState
+    from inercal.foundation.designs.exchange_kernel import DesignState, Update
 
 Indices = NDArray[np.intp]
 
@@ -195,16 +195,28 @@ def _first_least(values: Array) -> int:
 
 def _state(rows: Array, p: int, weights: Array | None, M: Array) -> DesignState:
     """Quantities that the exchanges of a design of information ``M`` use; ``rows`` (c, d, m) of the candidates."""
-    from inercal.foundation.designs.exchange_kernel import DesignState, along, own_products, update
+    from inercal.foundation.designs.exchange_kernel import DesignState, along, own_products
 
     c, d, _ = rows.shape
     P = np.asarray(np.linalg.inv(M), dtype=float)
-    whole = update(rows, P)
+    whole = _update(rows, P)
     common = whole
     if d > p:
-        common = update(np.ascontiguousarray(rows[:, p:]), np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
+        common = _update(np.ascontiguousarray(rows[:, p:]), np.asarray(np.linalg.inv(M[p:, p:]), dtype=float))
     if weights is None:
         none = np.empty((c, d, 0))
         return DesignState(whole, common, d > p, none, none, 0.0)
-    H = along(whole.G, weights)
-    return DesignState(whole, common, d > p, H, own_products(H, whole.G), float(np.sum(P * weights)))
+    H, K = np.empty_like(whole.G), np.empty_like(whole.F)
+    along(whole.G, weights, H)
+    own_products(H, whole.G, K)
+    return DesignState(whole, common, d > p, H, K, float(np.sum(P * weights)))
+
+
+def _update(W: Array, P: Array) -> Update:
+    """The update of rows W (c, d, m) about an information matrix whose inverse is P (d, d)."""
+    from inercal.foundation.designs.exchange_kernel import Update, update
+
+    c, _, m = W.shape
+    G, F, added = np.empty(W.shape), np.empty((c, c, m)), np.empty(m)
+    update(W, P, G, F, added)
+    return Update(W, G, F, added)

@@ -45,39 +45,36 @@ class DesignState(NamedTuple):
 
 
 @allocating
-def update(W: Array, P: Array) -> Update:
-    """The update about an information matrix whose inverse is P (d, d)."""
+def update(W: Array, P: Array, G: Array, F: Array, added: Array) -> None:
+    """Fill ``G``, ``F`` and ``added`` of the `Update` about an information matrix whose inverse is P (d, d)."""
     c, _, m = W.shape
-    G = along(W, P)
-    F, added = np.empty((c, c, m)), np.empty(m)
-    S = own_products(G, W)
+    along(W, P, G)
+    S = np.empty((c, c, m))
+    own_products(G, W, S)
     for a in range(c):
         S[a, a] += 1.0
     _inverses(S, F, added)
-    return Update(W, G, F, added)
 
 
 @allocating
-def along(W: Array, P: Array) -> Array:
-    """``W P`` (c, d, m) for P (d, d), symmetric."""
-    product = np.empty(W.shape)
+def along(W: Array, P: Array, product: Array) -> None:
+    """``product`` = ``W P`` (c, d, m) for P (d, d), symmetric."""
     for a in range(len(W)):
-        product[a] = P @ W[a]
-    return product
+        np.dot(P, W[a], product[a])
 
 
-@allocating
-def own_products(left: Array, right: Array) -> Array:
-    """``left``_j ``right``_j^T (c, c, m) of rows (c, d, m), where that is symmetric."""
+@kernel
+def own_products(left: Array, right: Array, products: Array) -> None:
+    """``products`` = ``left``_j ``right``_j^T (c, c, m) of rows (c, d, m), where that is symmetric."""
     c, d, m = left.shape
-    products = np.zeros((c, c, m))
+    products.fill(0.0)
     for a in range(c):
         for b in range(a, c):
             for k in range(d):
                 for j in range(m):
                     products[a, b, j] += left[a, k, j] * right[b, k, j]
-            products[b, a] = products[a, b]
-    return products
+            for j in range(m):
+                products[b, a, j] = products[a, b, j]
 
 
 @allocating
@@ -127,7 +124,7 @@ def _products(rows: Array, others: Array, i: int) -> Array:
     products = np.empty((c, c, m))
     one = np.ascontiguousarray(others[:, :, i])
     for a in range(c):
-        products[a] = one @ rows[a]
+        np.dot(one, rows[a], products[a])
     return products
 
 

@@ -25,15 +25,20 @@ from inercal.foundation.arrays import Array
 
 @allocating
 def _forward(
-    columns: Array, gaps: Array, white: Array, squares: Array, out: Array, size: Array, gain: Array
-) -> Array:
-    """Whiten ``columns`` (n, c) into ``out``; ``size`` and ``gain`` (n,) receive variance and gain of each step.
-
-    Returns (c + 1,): the integral of the bias that each column makes, and its variance.
-    """
+    columns: Array,
+    gaps: Array,
+    white: Array,
+    squares: Array,
+    out: Array,
+    size: Array,
+    gain: Array,
+    integral: Array,
+) -> None:
+    """Whiten ``columns`` (n, c) into ``out``; ``size`` and ``gain`` (n,) receive variance and gain of each step,
+    ``integral`` (c + 1,) the integral of the bias that each column makes, and its variance."""
     n, c = columns.shape
     level = columns[0].copy()
-    integral = np.zeros(c + 1)
+    integral.fill(0.0)
     p, p_mixed, p_integral = white[0], 0.0, 0.0
     size[0], gain[0] = math.inf, 1.0
     out[0] = 0.0
@@ -55,7 +60,6 @@ def _forward(
         p -= a * a * s
         size[k], gain[k] = s, a
     integral[c] = p_integral
-    return integral
 
 
 @kernel
@@ -106,7 +110,8 @@ def whiten(columns: Array, t: Array, white: Array, walk: float | Array) -> White
     gaps = np.diff(t, prepend=t[0])
     rows, size, gain = np.empty_like(columns), np.empty(len(t)), np.empty(len(t))
     squares = np.square(np.broadcast_to(np.asarray(walk, dtype=float), len(t)))
-    integral = _forward(columns, gaps, white, squares, rows, size, gain)
+    integral = np.empty(columns.shape[1] + 1)
+    _forward(columns, gaps, white, squares, rows, size, gain, integral)
     span = t[-1] - t[0]
     steps = np.append((squares * gaps)[1:], 0.0)
     return WhitenedColumns(

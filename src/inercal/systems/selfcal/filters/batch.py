@@ -152,7 +152,7 @@ def _terms_at(
     start is that of the first reading, whose errors are those of the states."""
     prior, dt, states = problem.prior, recording.dt, problem.states
     of_rows, by_start = sensed(q[1:], c, measured, problem), np.zeros((3, len(c)))
-    earth = np.array(base_of(states.full(c), states.layout.based, problem.world).earth)
+    earth = np.array(base_of(states.full(c), states.layout.based, problem.world)[0])
     turn, slope = turns(q[:-1], recording.steps, c, problem)
     if of_encoders:
         start, by_start = _at_encoders(recording, problem, c, start)

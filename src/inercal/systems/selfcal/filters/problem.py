@@ -20,7 +20,7 @@ from inercal.foundation.geometry.kernels import Quaternion, Vector
 from inercal.systems.selfcal.estimators import ESTIMATORS, FilterKind
 from inercal.systems.selfcal.platform.layout import StateLayout
 from inercal.systems.selfcal.platform.linearised import AXES, FLOOR, STIFF
-from inercal.systems.selfcal.platform.model import Rates, Room, base_of, encoders, room
+from inercal.systems.selfcal.platform.model import WIDEST, Rates, base_of, encoders, room
 from inercal.systems.selfcal.platform.rig import World
 from inercal.systems.selfcal.platform.states import ALL, StateVector
 from inercal.systems.selfcal.settings import Filter, Gating, Noise, SelfcalSettings
@@ -190,18 +190,22 @@ class AttitudeStart:
 def encoders_at(problem: FilterProblem, th: Array, c: Array, rate: Array) -> tuple[Array, Array]:
     """Attitude (4,) of p as encoders have it that read ``th`` (3,) [rad], and its change (3, p) [rad, about the axes of
     p] per change of the states ``c`` (p,); ``rate`` (3,) [rad/s] as read about that time."""
-    layout, own, slope = problem.states.layout, room(), np.zeros((3, len(c)))
+    layout, slope, axes = problem.states.layout, np.zeros((3, len(c))), np.zeros((WIDEST, 3))
     th, rate = np.array(th, dtype=float), np.array(rate, dtype=float)
-    q = _encoders_at(th, rate, problem.states.full(c), layout, problem.world, own)
-    slope[:, layout.columns - 3] = own.axes[: len(layout.columns)].T
+    q = _encoders_at(th, rate, problem.states.full(c), layout, problem.world, axes)
+    slope[:, layout.columns - 3] = axes[: len(layout.columns)].T
     return np.array(q), slope
 
 
 @allocating
 def _encoders_at(
-    th: Array, rate: Array, c: Array, layout: StateLayout, world: World, own: Room
+    th: Array, rate: Array, c: Array, layout: StateLayout, world: World, axes: Array
 ) -> Quaternion:
-    """The attitude (4,) of encoders, for `encoders_at`; its columns in ``own``."""
+    """The attitude (4,) of encoders, for `encoders_at`; ``axes`` (WIDEST, 3) of their columns."""
+    own = room()
     w, base = (rate[0], rate[1], rate[2]), base_of(c, layout.based, world)
     q = encoders(th, Rates(w, w), base, c, layout, world, own)
+    for j in range(WIDEST):
+        for i in range(3):
+            axes[j, i] = own.axes[j, i]
     return q
