@@ -6,7 +6,6 @@ the same digits in any of them, and on a cluster (`inercal.foundation.computing.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import threading
@@ -15,7 +14,6 @@ from concurrent.futures import (
     BrokenExecutor,
     CancelledError,
     Future,
-    ProcessPoolExecutor,
     ThreadPoolExecutor,
     as_completed,
     wait,
@@ -23,10 +21,12 @@ from concurrent.futures import (
 from concurrent.futures import Executor as Pool
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
-from typing import Any, Generic, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeAlias, TypeVar
 
 from inercal.foundation.errors import InercalError
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 T = TypeVar("T")
 
@@ -96,6 +96,9 @@ class Processes:
 
     def map(self, work: Callable[[Iterable[int]], T], chunks: Sequence[range]) -> Finished[T]:
         """Yield the chunks as they are finished."""
+        import multiprocessing
+        from concurrent.futures import ProcessPoolExecutor
+
         spawn = multiprocessing.get_context("spawn")
         theirs, ours = spawn.Pipe(duplex=False)
         with theirs, ProcessPoolExecutor(self.workers, spawn, _live_with, (theirs,)) as pool, ours:

@@ -15,7 +15,6 @@ import pickle
 import select
 import signal
 import struct
-import subprocess
 import sys
 import tempfile
 import threading
@@ -159,6 +158,8 @@ def _spawned(work: Work[Any], size: int, progress: Tell) -> _Ended:
         package = str(Path(__file__).parents[4])
         before = os.environ.get("PYTHONPATH")  # an empty part would be the working folder, anybody's
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (package, before)))}
+        import subprocess
+
         child = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
         )
