@@ -1,0 +1,97 @@
+"""Tables of what `run.py` wrote.
+
+    python -m benchmarks.held_out.table FOLDER
+
+Of faults: *harmful* are records of which some value is off by more than 3 U / 2, and was shifted by more than 2 u. Of these
+*unsaid* ended ok with no finding that the sound record has not; *said* ended ok with one; the others are not ok. *Faint*
+are those of the unsaid whose pattern in the readings is below 3 of their noise: no test of the data can show them.
+Of sound records: those that are not ok, and the upper 95 % bound of their share (Clopper and Pearson).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+
+Rows = list[dict[str, Any]]
+HARM = 1.5
+"""Error over U from which a record is harmful."""
+SHIFT = 2.0
+"""Shift over u from which a record is harmful."""
+FAINT = 3.0
+"""Size of a pattern below which no test can be asked to see it."""
+
+
+def read(folder: Path) -> Rows:
+    """All lines of a folder."""
+    return [json.loads(text) for file in sorted(folder.glob("*.jsonl")) for text in file.read_text().splitlines()]
+
+
+def bound(count: int, of: int) -> float:
+    """Upper 95 % bound of a share, one-sided (Clopper and Pearson)."""
+    return 1.0 if count >= of else float(beta.ppf(0.95, count + 1, of - count))
+
+
+def harmful(row: dict[str, Any]) -> bool:
+    """True where a value is off by more than 3 U / 2, and by the fault."""
+    return row.get("error_over_U", 0.0) > HARM and row.get("reached", 0.0) > SHIFT
+
+
+def said(row: dict[str, Any]) -> bool:
+    """True where there is a finding that the sound record has not."""
+    return any(finding["code"] not in row["sound_codes"] for finding in row["findings"])
+
+
+def faint(row: dict[str, Any]) -> bool:
+    """True where the readings hardly show the fault."""
+    return row.get("pattern_z") is not None and row["pattern_z"] < FAINT
+
+
+def groups(rows: Rows) -> Iterable[tuple[str, Rows]]:
+    """Rows by system and method, and all of them."""
+    names = list(dict.fromkeys(f"{row['system']}/{row['method']}" for row in rows))
+    for name in names:
+        yield name, [row for row in rows if f"{row['system']}/{row['method']}" == name]
+    yield "all", rows
+
+
+def main() -> None:
+    """Print the tables of a folder."""
+    rows = read(Path(sys.argv[1]))
+    faults = [row for row in rows if row["kind"] != "sound"]
+    sound = [row for row in rows if row["kind"] == "sound"]
+    if faults:
+        print("| method | records | harmful | ok, unsaid | of these faint | ok, said | not ok | of these named |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+        for name, group in groups(faults):
+            hurt = [row for row in group if harmful(row)]
+            fine = [row for row in hurt if row["status"] == "ok"]
+            unsaid = [row for row in fine if not said(row)]
+            bad = [row for row in hurt if row["status"] != "ok"]
+            counts = [len(group), len(hurt), len(unsaid), sum(map(faint, unsaid)), len(fine) - len(unsaid), len(bad)]
+            print(f"| {name} | {' | '.join(map(str, counts))} | {sum(row['named'] for row in bad)} |")
+        print("\nharmful and ok, unsaid:")
+        for row in faults:
+            if harmful(row) and row["status"] == "ok" and not said(row):
+                z = row["pattern_z"]
+                size = f"{row['error_over_u']:.1f} u ({row['error_over_U']:.1f} U) of {row['worst']}"
+                print(f"  {row['system']}/{row['method']}/{row['kind']}: {size}, pattern {'-' if z is None else round(z, 1)}")
+    if sound:
+        print("\n| method | sound records | not ok | share at most | rms of error over u | largest |")
+        print("| --- | --- | --- | --- | --- | --- |")
+        for name, group in groups(sound):
+            bad = sum(row["status"] != "ok" for row in group)
+            z = np.array([value for row in group for value in row.get("z", {}).values()], float)
+            z = z[np.isfinite(z)]
+            figures = f"{np.sqrt(np.mean(z**2)):.2f} | {np.abs(z).max():.1f}" if len(z) else "- | -"
+            print(f"| {name} | {len(group)} | {bad} | {100 * bound(bad, len(group)):.1f} % | {figures} |")
+
+
+if __name__ == "__main__":
+    main()
