@@ -84,7 +84,7 @@ def line(system: str, method: str, kind: Kind | None, draw: int, seed: int) -> d
             "worst": made.names[worst],
             "error_over_u": float(ratio[worst]),
             "error_over_U": float(np.nanmax(np.abs(made.error) / np.where(made.U > 0, made.U, np.inf))),
-            "named": any(made.names[worst] in finding["harm"] for finding in made.findings),
+            "named": any(made.names[worst].split("@")[0] in finding["harm"] for finding in made.findings),
             "z": dict(zip(made.names, np.round(made.error / made.u, 3).tolist(), strict=True)),
         }
     return row | {"processor_s": round(time.process_time() - begun, 2)}

@@ -64,7 +64,7 @@ class Steps:
 
 def draw(rng: np.random.Generator) -> Steps:
     """A test, all inputs within their stated uncertainty."""
-    largest, number = float(rng.choice([30.0, 60.0, 120.0])), int(rng.integers(15, 31))
+    largest, number = float(rng.choice([30.0, 60.0, 120.0])), int(rng.integers(22, 40))
     up = np.linspace(0, largest, number + 1)
     cycle = np.concatenate([up[1:], up[-2::-1], -up[1:], -up[-2::-1]])
     tilts = ARCSEC * np.concatenate([[0.0], np.tile(cycle, int(rng.integers(2, 4)))])
