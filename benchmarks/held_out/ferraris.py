@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +12,7 @@ import inercal as ic
 
 from . import sample_faults as shared
 from .samples import World, mems, progress
-from .trial import DEG, EARTH_RATE, G0, Act, Array, Case, log_uniform
+from .trial import DEG, EARTH_RATE, G0, Act, Array, Case, columns_of, log_uniform
 
 GRAVITY, GRAVITY_U = 9.80938, 2e-4
 RATE = 50.0
@@ -81,7 +81,30 @@ class Session:
         if act:
             act(world, size)
         world.make(*self.feel(world))
-        return Case(self.record(world), self.study(), self.truth)
+        return Case(self.record(world), self.study(), self.truth, self.means(world), self.columns)
+
+    def means(self, world: World) -> Array:
+        """Means of both triads over each section, over noise, tilts and angles."""
+        found = []
+        rows, _ = world.rows()
+        for k, length in enumerate(self.lengths):
+            of = rows[world.block[rows] == k]
+            n, along = round(length * RATE), np.eye(3)[k // 2 if k < 6 else k - 6]
+            rate = 0.0 if k < 6 else 2 * np.pi / length
+            turned = (1 + world.clock) * world.gyro[of].sum(axis=0) / n
+            tilt = self.alignment * (1 - along)
+            force_u = np.hypot(self.noise[0] / np.sqrt(n), GRAVITY * tilt)
+            rate_u = np.sqrt(
+                self.noise[1] ** 2 / n + (rate * tilt) ** 2 + (along * (k >= 6) * self.turn_u / length) ** 2
+            )
+            found += [world.acc[of].mean(axis=0) / force_u, turned / rate_u]
+        return np.concatenate(found)
+
+    def columns(self) -> Array:
+        """What each value does to these means, by differences."""
+        return columns_of(
+            lambda truth: np.asarray(replace(self, truth=dict(truth)).case().residual), self.truth
+        )
 
     def record(self, world: World) -> Any:
         """The record with labels."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ import inercal as ic
 from . import rows
 from .means import sphere, triad
 from .rows import World, counted
-from .trial import DEG, EARTH_RATE, Act, Array, Case, log_uniform
+from .trial import DEG, EARTH_RATE, Act, Array, Case, columns_of, log_uniform
 
 RPM = 6 * DEG
 
@@ -44,11 +45,28 @@ class Platter:
         world.give(world.x @ triad(self.truth, "S", "T").T, noise)
         world.y = world.y + [self.truth[f"D_F_{a}"] for a in "xyz"]
         records = [counted("gyro_? [rad/s]", world.y[self.file == k]) for k in range(len(self.rates))]
-        rates = [f"{r / RPM:.9g} ± {u / RPM:.4g} rpm" if u else "0 rpm" for r, u in zip(self.stated, self.u, strict=True)]
+        rates = [
+            f"{r / RPM:.9g} ± {u / RPM:.4g} rpm" if u else "0 rpm"
+            for r, u in zip(self.stated, self.u, strict=True)
+        ]
         study = ic.study(
             "imu", site={"latitude": f"{self.latitude / DEG:.8g} deg"}, method="known_rates", rates=rates
         )
-        return Case(records, study, self.truth)
+        return Case(
+            records, study, self.truth, self.misses(self.truth, world.y), lambda: self.columns(world.y)
+        )
+
+    def misses(self, truth: Mapping[str, float], y: Array) -> Array:
+        """At rates the size of the rate that a row tells, less the stated one; at rest the output less bias."""
+        bias = np.array([truth[f"D_F_{a}"] for a in "xyz"])
+        size = np.linalg.norm(np.linalg.solve(triad(truth, "S", "T"), (y - bias).T).T, axis=1)
+        moving = self.file > 0
+        spun = (size - self.stated[self.file])[moving] / np.hypot(self.noise, self.u[self.file[moving]])
+        return np.concatenate([spun, ((y - bias)[~moving] / np.hypot(self.noise, EARTH_RATE)).ravel()])
+
+    def columns(self, y: Array) -> Array:
+        """What each value does to these misses, by differences."""
+        return columns_of(lambda truth: self.misses(truth, y), self.truth)
 
 
 def draw(rng: np.random.Generator) -> Platter:

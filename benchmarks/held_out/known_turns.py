@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,7 @@ import inercal as ic
 from . import sample_faults as shared
 from .ferraris import near, turn_axis_tilted, turn_short
 from .samples import World, mems, progress
-from .trial import DEG, EARTH_RATE, G0, Act, Array, Case, log_uniform
+from .trial import DEG, EARTH_RATE, G0, Act, Array, Case, columns_of, log_uniform
 
 RATE = 100.0
 
@@ -70,13 +71,42 @@ class Turns:
                 "method": "known_turns",
                 "time_base": "20 ppm",
                 "turns": {
-                    a: f"{angle / DEG:.9g} ± {u:.6g} deg" for a, angle in zip("xyz", world.plan.stated, strict=True)
+                    a: f"{angle / DEG:.9g} ± {u:.6g} deg"
+                    for a, angle in zip("xyz", world.plan.stated, strict=True)
                 },
                 "alignment": f"{self.alignment / DEG:.6g} deg",
             },
         )
         kept = {name: value for name, value in self.truth.items() if name[0] in "DST"}
-        return Case(records, study, kept)
+        return Case(records, study, kept, self.means(world), self.columns)
+
+    def means(self, world: World) -> Array:
+        """Mean rates of the rests and the turn of each file, less the stated angle, over noise, tilts and angles."""
+        found = []
+        rows, _ = world.rows()
+        for k, time in enumerate(self.times):
+            along = np.eye(3)[k]
+            tilt = self.alignment * (1 - along)
+            of = rows[world.turn[rows] == k]
+            n = round(time * RATE)
+            rate = (1 + world.clock) * world.gyro[of].sum(axis=0) / n - along * world.plan.stated[k] / time
+            rate_u = np.sqrt(
+                self.noise**2 / n + (2 * np.pi / time * tilt) ** 2 + (along * self.turn_u / time) ** 2
+            )
+            found.append(rate / rate_u)
+            for rest in (world.t[rows] <= 5, world.t[rows] > 5):
+                of = rows[(world.hold[rows] == k) & rest]
+                found.append(world.gyro[of].mean(axis=0) / (self.noise / np.sqrt(5 * RATE)))
+        return np.concatenate(found)
+
+    def columns(self) -> Array:
+        """What each value does to these means, by differences."""
+        of = {name: value for name, value in self.truth.items() if name[0] in "DST"}
+
+        def means(truth: Mapping[str, float]) -> Array:
+            return np.asarray(replace(self, truth={**self.truth, **truth}).case().residual)
+
+        return columns_of(means, of)
 
 
 def draw(rng: np.random.Generator) -> Turns:

@@ -68,7 +68,9 @@ class Means:
             k2=f"0 ± {self.stated_k2 * G0 * 1e6:.6g} ug/g^2",
         )
         z = self.misses(self.truth, world.y)
-        columns = columns_of(lambda truth: self.misses(truth, self.outputs(self.truth, self.gravity * self.up)), self.truth)
+        columns = columns_of(
+            lambda truth: self.misses(truth, self.outputs(self.truth, self.gravity * self.up)), self.truth
+        )
         return Case(counted("acc_? [m/s^2]", world.y), study, self.truth, z, columns)
 
 

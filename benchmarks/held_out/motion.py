@@ -52,7 +52,7 @@ class Motion:
         force = np.zeros((len(t), 3))
         for share, before in ((1 / 6, 1.0), (4 / 6, 0.5), (1 / 6, 0.0)):
             attitude, rate, gain, carried = self.at(t - before * step - late)
-            felt = np.einsum("nji,nj->ni", attitude, carried + [0.0, 0.0, gravity])
+            felt = np.einsum("nji,nj->ni", attitude, carried + np.array([0.0, 0.0, gravity]))
             if arms is not None:
                 for i, arm in enumerate(arms):
                     across = np.cross(gain, arm) + np.cross(rate, np.cross(rate, arm))

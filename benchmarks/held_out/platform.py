@@ -68,7 +68,9 @@ def gimbals(th: Array) -> Array:
 
 def angles_of(C: Array, near: Array) -> Array:
     """The angles (n, 3) of an attitude, of both branches and all turns those nearest to some angles (n, 3)."""
-    first = np.stack([np.arctan2(-C[:, 0, 1], C[:, 1, 1]), np.arcsin(C[:, 2, 1]), np.arctan2(-C[:, 2, 0], C[:, 2, 2])], 1)
+    first = np.stack(
+        [np.arctan2(-C[:, 0, 1], C[:, 1, 1]), np.arcsin(C[:, 2, 1]), np.arctan2(-C[:, 2, 0], C[:, 2, 2])], 1
+    )
     second = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
     found = [b + 2 * np.pi * np.round((near - b) / (2 * np.pi)) for b in (first, second)]
     miss = [np.abs(b - near).sum(axis=1) for b in found]
@@ -99,15 +101,17 @@ class Platform:
         for joint, angle in self.path:
             row = np.zeros(3)
             row["xyz".index(joint)] = np.sign(angle) * DEG
-            rates += [row] * round(abs(angle) / (STEP * 1.0))
-        rates = np.array(rates + [np.zeros(3)])
+            rates += [row] * round(abs(angle) / STEP)
+        rates = np.array([*rates, np.zeros(3)])
         nominal = np.vstack([np.zeros(3), np.cumsum(rates[:-1] * STEP, axis=0)])
         return STEP * np.arange(len(rates)), nominal, rates
 
     def case(self, act: Act | None = None, size: float = 0.0) -> Case:
         """The record with a fault."""
         t, nominal, rates = self.plan()
-        world = World(t, nominal, rates, np.random.default_rng(self.seed), self.latitude, self.gravity, self.heading)
+        world = World(
+            t, nominal, rates, np.random.default_rng(self.seed), self.latitude, self.gravity, self.heading
+        )
         noise = np.random.default_rng(self.seed + 1)
         if act:
             act(world, size)
@@ -135,7 +139,7 @@ class Platform:
         rate = world.command * world.gyro_gain + world.command @ M.T + drift + world.gyro_bias + scatter
         steps, back = turned_by(rate * STEP), turned_by(-earth * STEP)
         C = np.empty((len(t), 3, 3))
-        C[0] = north(self.heading + 0.0) @ turned_by(self.beta) @ turned_by(1e-5 * noise.normal(size=3))
+        C[0] = north(self.heading) @ turned_by(self.beta) @ turned_by(1e-5 * noise.normal(size=3))
         for k in range(len(t) - 1):
             C[k + 1] = back @ C[k] @ steps[k]
         self.read(world, C, noise)
@@ -149,7 +153,7 @@ class Platform:
             act(world)
         base = north(world.heading) @ turned_by(world.base) @ turned_by(self.beta) @ turned_by(world.tilt)
         inside = np.swapaxes(base, 1, 2) @ C @ turned_by(-(self.gamma + world.block))
-        world.th = angles_of(inside, world.nominal) + [0.0, self.zero_y, 0.0]
+        world.th = angles_of(inside, world.nominal) + np.array([0.0, self.zero_y, 0.0])
         for change in world.on_encoders:
             change(world)
         at = world.t * (1 + world.encoder_clock) - late_encoder
@@ -157,10 +161,14 @@ class Platform:
         world.th = th + self.encoder * noise.normal(size=th.shape)
         f = np.stack([np.interp(world.t - late_acc, world.t, world.f[:, k]) for k in range(3)], axis=1)
         eta = [self.truth[f"eta_{name}"] for name in ("pz", "oy", "oz")]
-        f = np.stack([f[:, 0], f[:, 1] - eta[1] * f[:, 0], f[:, 2] + eta[0] * f[:, 0] - eta[2] * f[:, 1]], axis=1)
+        f = np.stack(
+            [f[:, 0], f[:, 1] - eta[1] * f[:, 0], f[:, 2] + eta[0] * f[:, 0] - eta[2] * f[:, 1]], axis=1
+        )
         scale = 1 + np.array([self.truth[f"ka1_{a}"] for a in "xyz"])
         offset = np.array([self.truth[f"ka0_{a}"] for a in "xyz"])
-        world.f = scale * f * world.acc_gain + offset + world.acc_bias + self.acc_noise * noise.normal(size=f.shape)
+        world.f = (
+            scale * f * world.acc_gain + offset + world.acc_bias + self.acc_noise * noise.normal(size=f.shape)
+        )
 
     def record(self, world: World) -> Any:
         """The record."""

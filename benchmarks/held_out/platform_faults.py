@@ -199,9 +199,23 @@ FAULTS: dict[str, tuple[float, Act]] = {
     for size, acts in (
         (0.01 * DEG_H, (gyro_drifts, knocked_gyro, weight_on_gyro)),
         (1e-5 * G0, (accelerometer_warms, sticking_sensor, turns_shake)),
-        (1e-5, (scale_droops, wrong_gravity, large_k2, cubic_sensor, cross_product, unequal_senses, torquer_bends)),
+        (
+            1e-5,
+            (
+                scale_droops,
+                wrong_gravity,
+                large_k2,
+                cubic_sensor,
+                cross_product,
+                unequal_senses,
+                torquer_bends,
+            ),
+        ),
         (1e-5, (clock_ratio,)),
-        (5 * ARCSEC, (base_settles, eccentric_disc, three_lobed_disc, counts_lost, coupling_wound, slipped_block)),
+        (
+            5 * ARCSEC,
+            (base_settles, eccentric_disc, three_lobed_disc, counts_lost, coupling_wound, slipped_block),
+        ),
         (5 * ARCSEC, (block_sags, bearing_cage)),
         (0.02 * DEG, (wrong_latitude, wrong_heading)),
     )

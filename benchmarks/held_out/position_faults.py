@@ -41,7 +41,9 @@ def creeping_mount(world: World, size: float) -> None:
 def slipped_mount(world: World, size: float) -> None:
     """A turn about a random axis from a random position on."""
     axis = world.pick.normal(size=3)
-    world.body += size * np.outer(world.k >= world.pick.integers(4, world.last - 3), axis / np.linalg.norm(axis))
+    world.body += size * np.outer(
+        world.k >= world.pick.integers(4, world.last - 3), axis / np.linalg.norm(axis)
+    )
 
 
 def backlash_inner(world: World, size: float) -> None:
@@ -51,17 +53,23 @@ def backlash_inner(world: World, size: float) -> None:
 
 def eccentric_disc(world: World, size: float) -> None:
     """One period a turn of the inner axis."""
-    world.errors["dphi_z2"] = world.errors["dphi_z2"] + size * np.sin(world.phi2 + world.pick.uniform(0, 6.28))
+    world.errors["dphi_z2"] = world.errors["dphi_z2"] + size * np.sin(
+        world.phi2 + world.pick.uniform(0, 6.28)
+    )
 
 
 def three_jaw_chuck(world: World, size: float) -> None:
     """Three periods a turn of the outer axis."""
-    world.errors["dphi_y1"] = world.errors["dphi_y1"] + size * np.sin(3 * world.phi1 + world.pick.uniform(0, 6.28))
+    world.errors["dphi_y1"] = world.errors["dphi_y1"] + size * np.sin(
+        3 * world.phi1 + world.pick.uniform(0, 6.28)
+    )
 
 
 def lost_counts(world: World, size: float) -> None:
     """The inner axis stands elsewhere from one position on."""
-    world.errors["dphi_z2"] = world.errors["dphi_z2"] + size * (world.k >= world.pick.integers(3, world.last - 2))
+    world.errors["dphi_z2"] = world.errors["dphi_z2"] + size * (
+        world.k >= world.pick.integers(3, world.last - 2)
+    )
 
 
 def angle_mistyped(world: World, size: float) -> None:
@@ -184,7 +192,9 @@ def pier_settles(world: World, size: float) -> None:
 
 def unbalanced_table(world: World, size: float) -> None:
     """A sag of the outer axis by the moment of a weight."""
-    world.errors["dphi_y1"] = world.errors["dphi_y1"] + size * np.cos(world.phi1 + world.pick.uniform(0, 6.28))
+    world.errors["dphi_y1"] = world.errors["dphi_y1"] + size * np.cos(
+        world.phi1 + world.pick.uniform(0, 6.28)
+    )
 
 
 def bearing_cage(world: World, size: float) -> None:
@@ -290,8 +300,14 @@ _ANGLE = 20 * ARCSEC
 FAULTS: dict[str, tuple[float, Act]] = {
     act.__name__: (size, act)
     for size, acts in (
-        (_ANGLE, (elastic_mount, creeping_mount, slipped_mount, backlash_inner, eccentric_disc, three_jaw_chuck)),
-        (_ANGLE, (lost_counts, cable_pull, pier_tilts, pier_settles, unbalanced_table, bearing_cage, parallax)),
+        (
+            _ANGLE,
+            (elastic_mount, creeping_mount, slipped_mount, backlash_inner, eccentric_disc, three_jaw_chuck),
+        ),
+        (
+            _ANGLE,
+            (lost_counts, cable_pull, pier_tilts, pier_settles, unbalanced_table, bearing_cage, parallax),
+        ),
         (_ANGLE, (zero_set_wrong, bent_trunnion)),
         (1 * DEG, (angle_mistyped, wrong_latitude)),
         (1e-2, (rows_exchanged,)),

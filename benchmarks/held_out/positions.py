@@ -58,7 +58,11 @@ class World:
         n = len(self.t)
         self.seen1, self.seen2 = self.phi1.copy(), self.phi2.copy()
         self.body, self.base = np.zeros((n, 3)), np.zeros((n, 3))
-        self.bias, self.gain, self.supply = np.zeros((n, self.channels)), np.ones((n, self.channels)), np.ones(n)
+        self.bias, self.gain, self.supply = (
+            np.zeros((n, self.channels)),
+            np.ones((n, self.channels)),
+            np.ones(n),
+        )
 
     @property
     def part(self) -> Array:
@@ -207,9 +211,13 @@ class Positions:
             late(world)
         spread = self.spread()
         z = (self.means(world.y) - self.expected(self.truth, world.seen1, world.seen2)) / spread
+        return Case(self.record(world), self.study(), self.truth, z.ravel(), lambda: self.columns(spread))
+
+    def columns(self, spread: Array) -> Array:
+        """What each value does to the mean readings, by differences, over their spread."""
         grid = self._grid()
         slopes = columns_of(lambda truth: self.expected(truth, *grid).ravel(), self.truth)
-        return Case(self.record(world), self.study(), self.truth, z.ravel(), slopes / spread.ravel()[:, None])
+        return np.asarray(slopes / spread.ravel()[:, None])
 
     def record(self, world: World) -> Any:
         """The record as a logger or a sheet has it."""
@@ -225,12 +233,21 @@ class Positions:
         """The study, with all that is stated."""
         instrument: dict[str, Any] = {"kind": self.kind, "dwell": "60 s", "terms": list(self.truth)}
         if self.kind == "accelerometer":
-            instrument |= {"unit": "g"} | ({"noise": f"{self.noise / G0 * 1e6:.6g} ug"} if self.stated else {})
+            instrument |= {"unit": "g"} | (
+                {"noise": f"{self.noise / G0 * 1e6:.6g} ug"} if self.stated else {}
+            )
         else:
-            instrument |= {"unit": "deg/h", "earth_rate": "stated", "coefficients": {"k_x": "1", "k_y": "0", "k_z": "0"}}
+            instrument |= {
+                "unit": "deg/h",
+                "earth_rate": "stated",
+                "coefficients": {"k_x": "1", "k_y": "0", "k_z": "0"},
+            }
             instrument |= {"noise": f"{self.noise / DEG_H:.6g} deg/h"} if self.stated else {}
         site = {"latitude": f"{self.latitude / DEG:.10g} deg", "gravity": f"9.80938 ± {GRAVITY_U} m/s^2"}
-        rig = {"kind": "two_axis_turntable", "errors": {"default": {"normal": f"{self.table / ARCSEC:.6g} arcsec"}}}
+        rig = {
+            "kind": "two_axis_turntable",
+            "errors": {"default": {"normal": f"{self.table / ARCSEC:.6g} arcsec"}},
+        }
         return ic.study("turntable", site=site, rig=rig, instrument=instrument)
 
 
@@ -266,7 +283,17 @@ def draw(rng: np.random.Generator) -> Positions:
             truth[f"K2_{a}"] = 2e-5 / G0 * rng.normal()
         noise = G0 * log_uniform(rng, 1e-6, 3e-5)
     else:
-        sizes = {"F": 5.0, "X": 4.0, "Y": 4.0, "Z": 1.0, "XX": 0.3, "YY": 0.3, "XY": 0.2, "XZ": 0.2, "YZ": 0.2}
+        sizes = {
+            "F": 5.0,
+            "X": 4.0,
+            "Y": 4.0,
+            "Z": 1.0,
+            "XX": 0.3,
+            "YY": 0.3,
+            "XY": 0.2,
+            "XZ": 0.2,
+            "YZ": 0.2,
+        }
         truth = {f"DX_{name}": DEG_H * size * rng.normal() for name, size in sizes.items()}
         noise = DEG_H * log_uniform(rng, 1e-3, 3e-2)
     return Positions(

@@ -80,7 +80,9 @@ def draw(rng: np.random.Generator) -> Rates:
     half = largest * np.linspace(1 / steps, 1, steps)
     up = np.concatenate([-half[::-1], half])
     choice = rng.integers(3)
-    rates = up if choice == 0 else np.concatenate([up, up[::-1]]) if choice == 1 else up[rng.permutation(len(up))]
+    rates = (
+        up if choice == 0 else np.concatenate([up, up[::-1]]) if choice == 1 else up[rng.permutation(len(up))]
+    )
     table, ppm = ARCSEC * log_uniform(rng, 2, 30), log_uniform(rng, 2, 50)
     truth = {"S_z": 1 + 1e-3 * rng.normal(), "D_F_z": log_uniform(rng, 0.1, 30) / 3600 * DEG, "S_asym_z": 0.0}
     return Rates(

@@ -18,10 +18,10 @@ from .trial import Array
 
 @dataclass
 class World:
-    """Inputs ``x`` (n, c) of a row each, as they are; ``seen`` (n,) what the sheet says of a row, where it says anything.
+    """Inputs ``x`` (n, c) of a row each, as they are; ``seen`` (n,) what the sheet says of a row, where it does.
 
-    Outputs are ``gain`` times what the instrument makes of x, and ``bias``; ``size`` is the largest input, ``span`` the
-    largest output. ``file`` (n,) is the number of the file of a row.
+    Outputs are ``gain`` times what the instrument makes of x, and ``bias``; ``span`` is the largest output. ``file``
+    (n,) is the number of the file of a row.
     """
 
     x: Array
@@ -86,7 +86,9 @@ def scale_drifts(world: World, size: float) -> None:
 
 def warming(world: World, size: float) -> None:
     """Biases that die away, to 1/e within a fifth of the test."""
-    world.bias += size * world.span * np.outer(np.exp(-5 * world.part), world.pick.normal(size=world.channels))
+    world.bias += (
+        size * world.span * np.outer(np.exp(-5 * world.part), world.pick.normal(size=world.channels))
+    )
 
 
 def bias_drifts(world: World, size: float) -> None:

@@ -3,9 +3,9 @@
     python -m benchmarks.held_out.run --half development --draws 2 --seed 1 --out FOLDER
     python -m benchmarks.held_out.run --half sound --draws 20 --seed 1 --out FOLDER
 
-Of a fault a record is first made without it, then with a size that is raised or lowered in a few trials until the worst
-affected value is shifted by what was drawn: 2 to 20 of its u in the sound record, evenly over orders of magnitude. What was
-reached is in the line, for harm may saturate.
+Of a fault a record is first made without it, then with a size that is raised or lowered in a few trials until the
+worst affected value is shifted by what was drawn: 2 to 20 of its u in the sound record, evenly over orders of
+magnitude. What was reached is in the line, for harm may saturate.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ def shift(made: Outcome, sound: Outcome) -> float:
     return float(np.nanmax(found)) if found else float("nan")
 
 
-def sized(scene: Scene, act: Act, nominal: float, wanted: float, sound: Outcome) -> tuple[float, float, Case, Outcome]:
+def sized(
+    scene: Scene, act: Act, nominal: float, wanted: float, sound: Outcome
+) -> tuple[float, float, Case, Outcome]:
     """The size by which a fault shifts a value by about what is wanted, that shift, its case and its outcome."""
     size, tried = nominal, []
     for _ in range(TRIALS):
@@ -75,7 +77,10 @@ def line(system: str, method: str, kind: Kind | None, draw: int, seed: int) -> d
         wanted = float(np.exp(rng.uniform(np.log(2.0), np.log(20.0))))
         size, reached, case, made = sized(scene, act, nominal, wanted, sound)
         row |= {"size": size, "wanted": wanted, "reached": reached, "sound_status": sound.status}
-        row |= {"pattern_z": pattern(case, first), "sound_codes": [finding["code"] for finding in sound.findings]}
+        row |= {
+            "pattern_z": pattern(case, first),
+            "sound_codes": [finding["code"] for finding in sound.findings],
+        }
     ratio = np.abs(made.error) / np.where(made.u > 0, made.u, np.inf)
     row |= {"status": made.status, "message": made.message, "findings": made.findings}
     if len(ratio):
@@ -92,7 +97,9 @@ def line(system: str, method: str, kind: Kind | None, draw: int, seed: int) -> d
 
 def main() -> None:
     """Run what the command line asks for."""
-    reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    reader = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     reader.add_argument("--half", choices=("development", "held-out", "sound"), required=True)
     reader.add_argument("--draws", type=int, default=1)
     reader.add_argument("--seed", type=int, default=1)
@@ -109,7 +116,9 @@ def main() -> None:
         listed = [None] if asked.half == "sound" else kinds(asked.half)
         with (asked.out / f"{asked.half}-{system}-{method}.jsonl").open("a") as file:
             for kind in listed:
-                if kind and ((kind.system, kind.method) != (system, method) or asked.kind not in ("", kind.name)):
+                if kind and (
+                    (kind.system, kind.method) != (system, method) or asked.kind not in ("", kind.name)
+                ):
                     continue
                 for draw in range(asked.draws):
                     row = line(system, method, kind, draw, asked.seed)

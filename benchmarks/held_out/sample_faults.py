@@ -221,7 +221,9 @@ def loose_chip(world: World, size: float) -> None:
 def creeping_mount(world: World, size: float) -> None:
     """A creep by the logarithm of time about one axis."""
     axis = np.eye(3)[world.channel()]
-    world.on_input.append(lambda world: lean(world, size * np.outer(np.log1p(20 * world.part) / np.log(21), axis)))
+    world.on_input.append(
+        lambda world: lean(world, size * np.outer(np.log1p(20 * world.part) / np.log(21), axis))
+    )
 
 
 def slipped_mount(world: World, size: float) -> None:
@@ -240,7 +242,10 @@ def sinks(world: World, size: float, time: float) -> None:
         after = np.flatnonzero(world.turn == number)
         axis = world.pick.normal(size=3)
         part[rows], axes[rows] = way, axis
-        part[after], axes[after] = way[-1] * np.linspace(1, 0, len(after) + 1)[1:] if len(after) else 0.0, axis
+        part[after], axes[after] = (
+            way[-1] * np.linspace(1, 0, len(after) + 1)[1:] if len(after) else 0.0,
+            axis,
+        )
     world.on_input.append(lambda world: lean(world, size * part[:, None] * axes))
 
 

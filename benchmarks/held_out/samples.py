@@ -16,9 +16,9 @@ from .trial import Array
 class World:
     """Samples (n,) of both triads; faults change the world before (``plan``, biases, gains) and while it is made.
 
-    ``turn`` and ``hold`` are the number of the turn or rest of a sample, -1 outside; ``block`` that of its file or section,
-    within which stamps run on though samples are lost. ``plan`` holds what is particular to a method. ``attitude`` takes
-    body to a level frame, where the method has one.
+    ``turn`` and ``hold`` are the number of the turn or rest of a sample, -1 outside; ``block`` that of its file or
+    section, within which stamps run on though samples are lost. ``plan`` holds what is particular to a method.
+    ``attitude`` takes body to a level frame, where the method has one.
     """
 
     t: Array
@@ -82,7 +82,9 @@ class World:
         scale = np.array([self.truth[f"K1_{a}"] for a in "xyz"])
         along = self.f @ (triad(self.truth, "K1", "M") / scale[:, None]).T
         offset = np.array([self.truth[f"K0_{a}"] for a in "xyz"])
-        self.acc = scale * (along + self.k2 * along**2) * self.acc_gain + offset + self.acc_bias + self.scatter[0]
+        self.acc = (
+            scale * (along + self.k2 * along**2) * self.acc_gain + offset + self.acc_bias + self.scatter[0]
+        )
         drift = np.array([self.truth[f"D_F_{a}"] for a in "xyz"])
         felt = np.array([[self.truth.get(f"G_{a}{b}", 0.0) for b in "xyz"] for a in "xyz"])
         rate = (self.w @ triad(self.truth, "S", "T").T) * self.gyro_gain

@@ -28,7 +28,11 @@ class Steps:
     def case(self, act: Act | None = None, size: float = 0.0) -> Case:
         """The record with a fault."""
         rng = np.random.default_rng(self.seed)
-        x = self.tilts[:, None] + self.jitter * rng.normal(size=(len(self.tilts), 1)) + self.table * rng.normal()
+        x = (
+            self.tilts[:, None]
+            + self.jitter * rng.normal(size=(len(self.tilts), 1))
+            + self.table * rng.normal()
+        )
         noise = self.noise * rng.normal(size=x.shape)
         span = G0 * float(np.abs(self.tilts).max())
         world = World(x, self.tilts.copy(), rng, 1, span, np.zeros(len(x)))

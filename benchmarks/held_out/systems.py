@@ -28,17 +28,18 @@ METHODS = {
 """Module of each (system, method); it has `draw` and `FAULTS`."""
 
 
-def _module(system: str, method: str) -> Any:
+def module_of(system: str, method: str) -> Any:
+    """The simulator of a method."""
     return import_module(f"{__package__}.{METHODS[system, method]}")
 
 
 def scene_of(system: str, method: str, rng: np.random.Generator) -> Scene:
     """A rig, instrument and plan of a method, drawn."""
-    scene: Scene = _module(system, method).draw(rng)
+    scene: Scene = module_of(system, method).draw(rng)
     return scene
 
 
 def fault_of(kind: Kind) -> tuple[Act, float]:
     """What a fault does, and a size to begin with."""
-    nominal, act = _module(kind.system, kind.method).FAULTS[kind.name]
+    nominal, act = module_of(kind.system, kind.method).FAULTS[kind.name]
     return act, nominal

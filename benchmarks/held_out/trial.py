@@ -25,15 +25,15 @@ class Case:
     """One record (or several), its study, and the true values in SI.
 
     ``residual`` (n,) are the readings less the model at the true values, over their noise, and ``columns`` (n, p) what
-    a unit of each value does to them; None where readings depend on what no study states. ``values`` takes from a
-    result names, values, u and U where these are not its parameters.
+    a unit of each value does to them, or a function that finds it; None where readings depend on what nobody knows.
+    ``values`` takes from a result names, values, u and U where these are not its parameters.
     """
 
     records: Any
     study: Any
     truth: Mapping[str, float]
     residual: Array | None = None
-    columns: Array | None = None
+    columns: Array | Callable[[], Array] | None = None
     values: Callable[[Any], tuple[list[str], Array, Array, Array]] | None = None
 
 
@@ -99,7 +99,9 @@ def pattern(case: Case, sound: Case) -> float | None:
     if case.residual.shape != sound.residual.shape:
         return None
     step = case.residual - sound.residual
-    left = step - sound.columns @ np.linalg.lstsq(sound.columns, step, rcond=None)[0]
+    columns = sound.columns() if callable(sound.columns) else sound.columns
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    left = step - columns @ np.linalg.lstsq(columns, step, rcond=None)[0]
     return float(np.sqrt(left @ left))
 
 

@@ -64,7 +64,12 @@ class World:
         """Find what each accelerometer should indicate [m/s²] (n, 3)."""
         th, w2 = self.theta[:, None], (self.w**2)[:, None]
         yaw2 = (self.yaw_rate**2)[:, None]
-        fx = self.gravity * np.sin(th) - self.places * (w2 + yaw2) - self.heights * self.al[:, None] + self.axial[:, None]
+        fx = (
+            self.gravity * np.sin(th)
+            - self.places * (w2 + yaw2)
+            - self.heights * self.al[:, None]
+            + self.axial[:, None]
+        )
         fz = self.gravity * np.cos(th) * np.cos(self.roll)[:, None] + self.places * self.al[:, None]
         fz = fz - self.heights * w2 + self.heave[:, None]
         angle = AXES + self.lean
@@ -96,12 +101,26 @@ class Run:
         rng = np.random.default_rng(self.seed)
         theta, w, al = self.motion(t)
         ones = np.ones((len(t), 1))
-        world = World(t, theta, w, al, PLACES + self.places * ones, self.heights * ones, rng, self.gravity, self.pauses)
+        world = World(
+            t, theta, w, al, PLACES + self.places * ones, self.heights * ones, rng, self.gravity, self.pauses
+        )
         noise = np.random.default_rng(self.seed + 1)
         for frequency in noise.uniform(8, 10, size=12):
-            world.heave += 0.002 * G0 / np.sqrt(6) * noise.normal() * np.sin(2 * np.pi * frequency * t + noise.uniform(0, 6))
+            world.heave += (
+                0.002
+                * G0
+                / np.sqrt(6)
+                * noise.normal()
+                * np.sin(2 * np.pi * frequency * t + noise.uniform(0, 6))
+            )
         for frequency in noise.uniform(11, 13, size=12):
-            world.axial += 0.001 * G0 / np.sqrt(6) * noise.normal() * np.sin(2 * np.pi * frequency * t + noise.uniform(0, 6))
+            world.axial += (
+                0.001
+                * G0
+                / np.sqrt(6)
+                * noise.normal()
+                * np.sin(2 * np.pi * frequency * t + noise.uniform(0, 6))
+            )
         truth_theta = theta.copy()
         if act:
             act(world, size)
@@ -128,7 +147,9 @@ class Run:
 
         def values(result: Any) -> tuple[list[str], Array, Array, Array]:
             table = result.view.rows()
-            theta_seen, u = (np.asarray(table[name].values, float)[rows] * DEG for name in ("theta", "u_theta"))
+            theta_seen, u = (
+                np.asarray(table[name].values, float)[rows] * DEG for name in ("theta", "u_theta")
+            )
             return list(truth), theta_seen, u, 2.0 * u
 
         return Case(record, self.study(), truth, values=values)

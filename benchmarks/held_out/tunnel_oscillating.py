@@ -11,8 +11,14 @@ from .tunnel import Run, World, drawn
 
 def draw(rng: np.random.Generator) -> Run:
     """An oscillation of one or two sines."""
-    mean, size = DEG * rng.uniform(-5, 35), DEG * rng.uniform(3, 12, size=2) * [1.0, float(rng.integers(2)) / 4]
-    w, phase = 2 * np.pi * np.array([rng.uniform(0.5, 2.0), rng.uniform(2.0, 3.5)]), rng.uniform(0, 6.28, size=2)
+    mean, size = (
+        DEG * rng.uniform(-5, 35),
+        DEG * rng.uniform(3, 12, size=2) * [1.0, float(rng.integers(2)) / 4],
+    )
+    w, phase = (
+        2 * np.pi * np.array([rng.uniform(0.5, 2.0), rng.uniform(2.0, 3.5)]),
+        rng.uniform(0, 6.28, size=2),
+    )
 
     def motion(t: Array) -> tuple[Array, Array, Array]:
         at = np.outer(t, w) + phase

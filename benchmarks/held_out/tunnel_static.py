@@ -12,7 +12,11 @@ from .tunnel import Run, World, buffet, drawn
 
 def draw(rng: np.random.Generator) -> Run:
     """A polar."""
-    first, step, count = float(rng.choice([-10.0, -5.0, 0.0])), float(rng.choice([3.0, 5.0, 8.0])), int(rng.integers(6, 9))
+    first, step, count = (
+        float(rng.choice([-10.0, -5.0, 0.0])),
+        float(rng.choice([3.0, 5.0, 8.0])),
+        int(rng.integers(6, 9)),
+    )
     shaken = buffet(rng, DEG * float(rng.choice([0.01, 0.05])))
     begins = 4.0 + 5.5 * np.arange(count)
 

@@ -77,6 +77,7 @@ class Unit:
                 "gyro_walk": "0 deg/h/sqrt(s)", "accelerometer_walk": "0 ug/sqrt(s)",
             },
             rests={"velocity": f"{sway} mm/s"},
+            start={"heading": "gyrocompass" if self.grade == "navigation" else "free"},
             prior={
                 "gyro_bias": f"{drift} deg/h", "scale": f"{scale} ppm", "misalignment": f"{skew} arcsec",
                 "bias": f"{bias} ug", "k1": f"{k1} ppm", "axes": f"{axes} arcsec", "k2": "100 ug/g^2",
