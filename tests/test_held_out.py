@@ -9,6 +9,7 @@ import pytest
 from held_out.kinds import check, kinds
 from held_out.run import seed_of
 from held_out.systems import METHODS, fault_of, module_of, scene_of
+from held_out.table import bound, harmed, said
 from held_out.trial import Case, outcome, pattern
 
 CHEAP = [("turntable", "rates"), ("imu", "means"), ("imu", "known_rates"), ("imu", "known_turns")]
@@ -73,3 +74,28 @@ def test_a_pattern_of_the_values_is_none() -> None:
     assert sizes[0] is not None
     assert sizes[1] is not None
     assert sizes[0] < 0.02 * sizes[1]
+
+
+def test_the_bound_of_a_share_is_that_of_clopper_and_pearson() -> None:
+    """None of n: the bound p has (1 - p)^n = 0.05; all of n: it is 1; one of n: 0.05 for none or one."""
+    assert bound(0, 20) == pytest.approx(1 - 0.05 ** (1 / 20))
+    p = bound(1, 20)
+    assert (1 - p) ** 20 + 20 * p * (1 - p) ** 19 == pytest.approx(0.05)
+    assert bound(20, 20) == 1.0
+
+
+def test_harm_and_what_is_said_of_it() -> None:
+    """Harmed: off by more than 3 U / 2 and itself shifted by more than 2 u. Said: a new finding, or an old one about it."""
+    values = {
+        "K1_x": [3.2, 1.6, 0.5],
+        "S_x": [3.2, 1.6, 3.0],
+        "S_y": [-4.0, 2.0, 2.1],
+        "S_z": [2.8, 1.4, 9.0],
+    }
+    row: dict[str, Any] = {"kind": "clock_fast", "values": values, "sound_codes": ["weak_test"]}
+    assert harmed(row) == ["S_y", "S_x"]
+    assert harmed({**row, "values": {}}) == []
+    old = {"code": "weak_test", "headline": "This test hides a harmonic.", "action": "", "items": []}
+    assert not said({**row, "findings": [old]})
+    assert said({**row, "findings": [{**old, "headline": "This test hides an error of the clock."}]})
+    assert said({**row, "findings": [{**old, "code": "trend"}]})

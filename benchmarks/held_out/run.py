@@ -22,7 +22,7 @@ import numpy as np
 
 from .kinds import Kind, check, kinds
 from .systems import METHODS, fault_of, scene_of
-from .trial import Act, Case, Outcome, Scene, outcome, pattern
+from .trial import Act, Array, Case, Outcome, Scene, outcome, pattern
 
 TRIALS = 4
 """Most sizes that are tried for a shift."""
@@ -33,15 +33,23 @@ def seed_of(*words: object) -> int:
     return zlib.crc32("/".join(map(str, words)).encode())
 
 
-def shift(made: Outcome, sound: Outcome) -> float:
-    """The largest shift of a value from that of the sound record, over its u there; nan where nothing is comparable."""
-    before = dict(zip(sound.names, zip(sound.value, sound.u, strict=True), strict=True))
+def shifts(made: Outcome, sound: Outcome) -> Array:
+    """How far each value is from that of the sound record, over its u there; nan where that has none."""
+    before = {
+        name: (value, u) for name, value, u in zip(sound.names, sound.value, sound.u, strict=True) if u > 0
+    }
+    none = (np.nan, np.nan)
     found = [
-        abs(value - before[name][0]) / before[name][1]
+        abs(value - before.get(name, none)[0]) / before.get(name, none)[1]
         for name, value in zip(made.names, made.value, strict=True)
-        if name in before and before[name][1] > 0
     ]
-    return float(np.nanmax(found)) if found else float("nan")
+    return np.array(found, float)
+
+
+def shift(made: Outcome, sound: Outcome) -> float:
+    """The largest of these shifts; nan where nothing is comparable."""
+    found = shifts(made, sound)
+    return float(np.nanmax(found)) if np.isfinite(found).any() else float("nan")
 
 
 def sized(
@@ -76,22 +84,23 @@ def line(system: str, method: str, kind: Kind | None, draw: int, seed: int) -> d
         act, nominal = fault_of(kind)
         wanted = float(np.exp(rng.uniform(np.log(2.0), np.log(20.0))))
         size, reached, case, made = sized(scene, act, nominal, wanted, sound)
-        row |= {"size": size, "wanted": wanted, "reached": reached, "sound_status": sound.status}
+        found = reached if np.isfinite(reached) else None
+        row |= {"size": size, "wanted": wanted, "reached": found, "sound_status": sound.status}
         row |= {
             "pattern_z": pattern(case, first),
             "sound_codes": [finding["code"] for finding in sound.findings],
         }
-    ratio = np.abs(made.error) / np.where(made.u > 0, made.u, np.inf)
     row |= {"status": made.status, "message": made.message, "findings": made.findings}
-    if len(ratio):
-        worst = int(np.nanargmax(ratio))
-        row |= {
-            "worst": made.names[worst],
-            "error_over_u": float(ratio[worst]),
-            "error_over_U": float(np.nanmax(np.abs(made.error) / np.where(made.U > 0, made.U, np.inf))),
-            "named": any(made.names[worst].split("@")[0] in finding["harm"] for finding in made.findings),
-            "z": dict(zip(made.names, np.round(made.error / made.u, 3).tolist(), strict=True)),
-        }
+    if made.names:
+        ratios = [np.abs(made.error) / np.where(width > 0, width, np.inf) for width in (made.u, made.U)]
+        moved = shifts(made, sound)
+        row["worst"] = made.names[int(np.nanargmax(ratios[0]))]
+        row["error_over_u"] = float(np.nanmax(ratios[0]))
+        row["named"] = any(row["worst"].split("@")[0] in finding["harm"] for finding in made.findings)
+        rounded = np.round(np.stack([made.error / made.u, ratios[1], moved], axis=1), 4)
+        row["values"] = dict(
+            zip(made.names, np.where(np.isfinite(rounded), rounded, 0.0).tolist(), strict=True)
+        )
     return row | {"processor_s": round(time.process_time() - begun, 2)}
 
 
