@@ -85,7 +85,7 @@ def test_the_bound_of_a_share_is_that_of_clopper_and_pearson() -> None:
 
 
 def test_harm_and_what_is_said_of_it() -> None:
-    """Harmed: off by more than 3 U / 2 and itself shifted by more than 2 u. Said: a new finding, or an old one about it."""
+    """Harmed: off by more than 3 U / 2, and itself shifted. Said: a new finding, or an old one about the fault."""
     values = {
         "K1_x": [3.2, 1.6, 0.5],
         "S_x": [3.2, 1.6, 3.0],

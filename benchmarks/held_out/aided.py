@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -12,8 +13,9 @@ from scipy.spatial.transform import Rotation
 import inercal as ic
 
 from . import sample_faults as shared
+from .means import triad
 from .samples import World, mems, progress
-from .trial import ARCSEC, DEG, EARTH_RATE, G0, Act, Array, Case, log_uniform, turn
+from .trial import ARCSEC, DEG, EARTH_RATE, G0, Act, Array, Case, columns_of, log_uniform, turn
 
 GRAVITY, GRAVITY_U = 9.80938, 2e-5
 RATE = 50.0
@@ -83,23 +85,48 @@ class Table:
         )  # fmt: skip
         if act:
             act(world, size)
-        step = 1 / RATE
-        before, after, middle = (self.attitude(time, world) for time in (t - step, t, t - step / 2))
-        change = Rotation.from_matrix(np.swapaxes(before, 1, 2) @ after).as_rotvec() / step
-        earth = EARTH_RATE * np.array([np.cos(self.latitude), 0.0, np.sin(self.latitude)])
-        up = (before[:, 2] + 4 * middle[:, 2] + after[:, 2]) / 6
-        world.make(self.gravity * up, change + np.einsum("nji,j->ni", middle, earth))
+        world.make(*self.felt(t, lambda time: self.attitude(time, world), self.gravity))
         # an angle stands beside the mean of the samples about it, half a sample before the stamp
-        seen = self.angles((t - step / 2) * (1 + plan.encoder_clock))
-        for act_on in plan.on_encoders:
-            seen = act_on(t, seen)
+        seen = self.recorded(t - 0.5 / RATE, plan)
         seen = seen + self.encoder * np.random.default_rng(self.seed + 5).normal(size=seen.shape)
         rows, stamps = world.rows()
         record = ic.record(
             t=stamps, acc=world.acc[rows], gyro=world.gyro[rows], phi1=seen[rows, 0] / DEG, phi2=seen[rows, 1] / DEG,
             units={"phi1": "deg", "phi2": "deg"},
         )  # fmt: skip
-        return Case(record, self.study(), self.truth)
+        f, w = self.felt(t, lambda time: self.believed(time, plan), GRAVITY)
+
+        def misses(truth: Mapping[str, float]) -> Array:
+            """Outputs less those at the recorded angles, over the white noise."""
+            offset, drift = (np.array([truth[f"{name}_{a}"] for a in "xyz"]) for name in ("K0", "D_F"))
+            force = (world.acc - f @ triad(truth, "K1", "M").T - offset) / self.noise[0]
+            rate = (world.gyro - w @ triad(truth, "S", "T").T - drift) / self.noise[1]
+            return np.concatenate([force.ravel(), rate.ravel()])
+
+        return Case(
+            record, self.study(), self.truth, misses(self.truth), lambda: columns_of(misses, self.truth)
+        )
+
+    def recorded(self, t: Array, plan: SimpleNamespace) -> Array:
+        """The angles (n, 2) that the encoders tell, without their noise."""
+        found = self.angles(t * (1 + plan.encoder_clock))
+        for change in plan.on_encoders:
+            found = change(t, found)
+        return np.asarray(found)
+
+    def believed(self, t: Array, plan: SimpleNamespace) -> Array:
+        """The attitude of a perfect table at these angles."""
+        joints = self.recorded(t, plan)
+        return np.asarray(turn("z", self.azimuth) @ turn("y", joints[:, 0]) @ turn("z", joints[:, 1]))
+
+    def felt(self, t: Array, attitude: Callable[[Array], Array], gravity: float) -> tuple[Array, Array]:
+        """Mean force and rate (n, 3) over the samples that end at t."""
+        step = 1 / RATE
+        before, after, middle = (attitude(time) for time in (t - step, t, t - step / 2))
+        change = Rotation.from_matrix(np.swapaxes(before, 1, 2) @ after).as_rotvec() / step
+        earth = EARTH_RATE * np.array([np.cos(self.latitude), 0.0, np.sin(self.latitude)])
+        up = (before[:, 2] + 4 * middle[:, 2] + after[:, 2]) / 6
+        return gravity * up, change + np.einsum("nji,j->ni", middle, earth)
 
     def study(self) -> Any:
         """The study, with all that is stated."""

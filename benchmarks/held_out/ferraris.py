@@ -49,9 +49,10 @@ class Session:
             block.append(np.full(n, k))
             begin += length + 12.0
         plan = SimpleNamespace(up=self.up.copy(), axes=self.axes.copy(), angles=self.angles.copy())
+        of_t, of_turn, of_hold, of_block = (np.concatenate(column) for column in (t, turn, hold, block))
         return World(
-            *(np.concatenate(column) for column in (t, turn, hold, block)), self.truth,
-            np.random.default_rng(self.seed), self.noise, np.zeros(3), self.gravity, plan, self.clock,
+            of_t, of_turn, of_hold, of_block, self.truth, np.random.default_rng(self.seed), self.noise, np.zeros(3),
+            self.gravity, plan, self.clock,
         )  # fmt: skip
 
     def feel(self, world: World) -> tuple[Array, Array]:

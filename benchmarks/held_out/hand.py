@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -10,9 +11,10 @@ import numpy as np
 import inercal as ic
 
 from . import sample_faults as shared
+from .means import triad
 from .motion import Motion
 from .samples import World, mems
-from .trial import DEG, G0, Act, Array, Case, log_uniform, turned_by
+from .trial import DEG, G0, Act, Array, Case, columns_of, log_uniform, turned_by
 
 GRAVITY, GRAVITY_U = 9.80938, 5e-5
 RATE = 100.0
@@ -53,7 +55,48 @@ class Hand:
             time_base="20 ppm",
             k2=f"0 ± {self.k2_u * G0 * 1e6:.6g} ug/g^2",
         )
-        return Case(record, study, self.truth)
+        misses = self.misses(self.truth, world)
+        return Case(
+            record,
+            study,
+            self.truth,
+            misses,
+            lambda: columns_of(lambda of: self.misses(of, world), self.truth),
+        )
+
+    def misses(self, truth: Mapping[str, float], world: World) -> Array:
+        """Of each rest the force it tells less gravity, of each turn how far gravity arrives elsewhere, over noise."""
+        rows, stamps = world.rows()
+        step = float(np.median(np.diff(stamps)))
+        offset, drift = (np.array([truth[f"{name}_{a}"] for a in "xyz"]) for name in ("K0", "D_F"))
+        f = np.linalg.solve(triad(truth, "K1", "M"), (world.acc[rows] - offset).T).T
+        f = f - self.k2 * f**2
+        turns = turned_by(np.linalg.solve(triad(truth, "S", "T"), (world.gyro[rows] - drift).T).T * step)
+        hold = world.hold[rows]
+        found, before = [], None
+        for number in np.unique(hold[hold >= 0]):
+            of = np.flatnonzero(hold == number)
+            mean, force_u = f[of].mean(axis=0), self.noise[0] / np.sqrt(len(of))
+            size = np.linalg.norm(mean)
+            found.append((size - GRAVITY) / force_u)
+            if before is not None:
+                last, middle, last_u = before
+                way = turns[middle : of[len(of) // 2]]
+                rate_u = self.noise[1] * step * np.sqrt(len(way))
+                u = np.sqrt(rate_u**2 + (force_u**2 + last_u**2) / GRAVITY**2)
+                found.extend((last @ product(way) - mean / size) / u)
+            before = mean / size, of[len(of) // 2], force_u
+        return np.array(found)
+
+
+def product(turns: Array) -> Array:
+    """The product (3, 3) of rotations (n, 3, 3), the first on the left."""
+    while len(turns) > 1:
+        odd = turns[-1:] if len(turns) % 2 else turns[:0]
+        turns = np.concatenate(
+            [turns[0 : len(turns) - len(odd) : 2] @ turns[1 : len(turns) - len(odd) : 2], odd]
+        )
+    return np.asarray(turns[0])
 
 
 def draw(rng: np.random.Generator) -> Hand:

@@ -42,7 +42,7 @@ class Means:
         """Outputs without fault (n, 3)."""
         scale = np.array([truth[f"K1_{a}"] for a in "xyz"])
         along = x @ (triad(truth, "K1", "M") / scale[:, None]).T
-        return scale * (along + self.k2 * along**2) + [truth[f"K0_{a}"] for a in "xyz"]
+        return np.asarray(scale * (along + self.k2 * along**2) + [truth[f"K0_{a}"] for a in "xyz"])
 
     def misses(self, truth: Mapping[str, float], y: Array) -> Array:
         """The size of the force that each row tells, less the stated gravity, over the noise."""
@@ -50,7 +50,7 @@ class Means:
         gain = triad(truth, "K1", "M")
         f = np.linalg.solve(gain, offset.T).T
         f = np.linalg.solve(gain, (offset - np.array([truth[f"K1_{a}"] for a in "xyz"]) * self.k2 * f**2).T).T
-        return (np.linalg.norm(f, axis=1) - GRAVITY) / self.noise
+        return np.asarray((np.linalg.norm(f, axis=1) - GRAVITY) / self.noise)
 
     def case(self, act: Act | None = None, size: float = 0.0) -> Case:
         """The table with a fault."""
@@ -78,7 +78,7 @@ def sphere(rng: np.random.Generator, n: int) -> Array:
     """Directions (n, 3): the six sides first, then any."""
     found = np.vstack([np.eye(3), -np.eye(3), rng.normal(size=(n - 6, 3))]) + 0.05 * rng.normal(size=(n, 3))
     found = found[rng.permutation(n)]
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def draw(rng: np.random.Generator) -> Means:

@@ -58,7 +58,7 @@ class World:
     @property
     def part(self) -> Array:
         """How much of the test is over at each row, 0 to 1."""
-        return self.t / self.t[-1]
+        return np.asarray(self.t / self.t[-1])
 
 
 def gimbals(th: Array) -> Array:
@@ -97,12 +97,12 @@ class Platform:
 
     def plan(self) -> tuple[Array, Array, Array]:
         """Times, nominal angles and joint rates of the rows."""
-        rates = []
+        listed = []
         for joint, angle in self.path:
             row = np.zeros(3)
             row["xyz".index(joint)] = np.sign(angle) * DEG
-            rates += [row] * round(abs(angle) / STEP)
-        rates = np.array([*rates, np.zeros(3)])
+            listed += [row] * round(abs(angle) / STEP)
+        rates = np.array([*listed, np.zeros(3)])
         nominal = np.vstack([np.zeros(3), np.cumsum(rates[:-1] * STEP, axis=0)])
         return STEP * np.arange(len(rates)), nominal, rates
 

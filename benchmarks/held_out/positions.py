@@ -67,7 +67,7 @@ class World:
     @property
     def part(self) -> Array:
         """How much of the test is over at each row, 0 to 1."""
-        return self.t / self.t[-1]
+        return np.asarray(self.t / self.t[-1])
 
     @property
     def last(self) -> int:
@@ -177,7 +177,7 @@ class Positions:
 
     def means(self, y: Array) -> Array:
         """Means over the rows of each position."""
-        return y.reshape(len(self.angles), self.samples, -1).mean(axis=1)
+        return np.asarray(y.reshape(len(self.angles), self.samples, -1).mean(axis=1))
 
     def spread(self) -> Array:
         """Standard deviation of the mean readings by noise and by what of the table is redrawn at each position."""
@@ -190,7 +190,7 @@ class Positions:
                 output, bias = self.model(self.truth, world)
                 slope = (self.means(output + bias) - self.expected(self.truth, *self._grid())) / 1e-5
                 variance = variance + (slope * self.table) ** 2
-        return np.sqrt(variance)
+        return np.asarray(np.sqrt(variance))
 
     def _grid(self) -> tuple[Array, Array]:
         k = np.repeat(np.arange(len(self.angles)), self.samples)
@@ -276,7 +276,7 @@ def draw(rng: np.random.Generator) -> Positions:
     """A test, all inputs within their stated uncertainty."""
     kind = str(rng.choice(["accelerometer", "gyrowheel"]))
     if kind == "accelerometer":
-        truth = {}
+        truth: dict[str, float] = {}
         for a in "xyz":
             truth |= {f"K0_{a}": 2e-4 * G0 * rng.normal(), f"K1_{a}": 1 + 3e-4 * rng.normal()}
             truth |= {f"M_{a}{b}": 60 * ARCSEC * rng.normal() for b in "xyz" if b != a}

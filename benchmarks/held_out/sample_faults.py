@@ -186,7 +186,7 @@ def gyro_warms(world: World, size: float) -> None:
 
 def _walk(world: World) -> Array:
     steps = np.random.default_rng(int(world.pick.integers(2**31))).normal(size=(len(world.t), 3))
-    return np.cumsum(steps, axis=0) / np.sqrt(len(world.t))
+    return np.asarray(np.cumsum(steps, axis=0) / np.sqrt(len(world.t)))
 
 
 def accelerometer_wanders(world: World, size: float) -> None:

@@ -53,7 +53,7 @@ class World:
     @property
     def part(self) -> Array:
         """How much of the test is over at each sample, 0 to 1."""
-        return (self.t - self.t[0]) / (self.t[-1] - self.t[0])
+        return np.asarray((self.t - self.t[0]) / (self.t[-1] - self.t[0]))
 
     @property
     def step(self) -> float:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -86,10 +87,9 @@ THEMES = {
 def said(row: dict[str, Any]) -> bool:
     """True where a finding is about the fault: new against the sound record, or with a word of its theme."""
     words = "|".join(words for names, words in THEMES.items() if re.search(names, row["kind"]))
-    return any(
-        finding["code"] not in row["sound_codes"]
-        or (words and re.search(words, json.dumps(finding), re.IGNORECASE))
-        for finding in row["findings"]
+    codes = Counter(finding["code"] for finding in row["findings"]) - Counter(row["sound_codes"])
+    return bool(codes) or any(
+        words and re.search(words, json.dumps(finding), re.IGNORECASE) for finding in row["findings"]
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import inercal as ic
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 DEG = np.pi / 180
 ARCSEC = DEG / 3600

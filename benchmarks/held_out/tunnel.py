@@ -54,7 +54,7 @@ class World:
     @property
     def part(self) -> Array:
         """How much of the run is over at each sample, 0 to 1."""
-        return self.t / self.t[-1]
+        return np.asarray(self.t / self.t[-1])
 
     def sensor(self) -> int:
         """An accelerometer by chance."""
