@@ -69,7 +69,7 @@ THEMES = {
     r"k2": r"K2|second-order|square",
     r"cubic|bend": r"K3|third|linear",
     r"weight_on_gyro|feels_force|tilted_platter": r"specific force|g-sens|gravity",
-    r"warm|drift|heats|sun|creep|switched|restart|wanders|settl": r"drift|warm|trend|ramp|walk",
+    r"warm|drift|heats|sun|creep|switched|restart|wanders|settl": r"drifts?\b(?! of)|warm|trend|ramp|walk",
     r"supply|scale|droops|wheel_speed": r"scale",
     r"magnet|field": r"field",
     r"axis_turned|bracket": r"axis of|turned",
