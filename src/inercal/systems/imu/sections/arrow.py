@@ -63,12 +63,6 @@ class ArrowSolution:
         """Covariance (l, l) of the unknowns of sections where the shared ones are known."""
         return np.asarray(cho_solve_banded((self._band, True), np.diag(self._scale)) * self._scale[:, None])
 
-    @property
-    def local_variance(self) -> Array:
-        """Variances (l,) of the unknowns of sections."""
-        by_shared = np.einsum("ls,st,lt->l", self.carried, self.covariance, self.carried)
-        return np.asarray(np.diag(self.given) + by_shared)
-
 
 class Linear:
     """The linear problem of a point, for any variances that nobody states.
@@ -185,6 +179,18 @@ class Linear:
         known = float(np.sum(np.log(sd[np.isfinite(sd)])))
         value = -0.5 * (size + 2.0 * known + volume + phi - gain)
         return ArrowSolution(shared, local, value, phi - gain, gain, covariance, carried, factor, scale)
+
+    def weighed_misfits(self, z: Array, misses: Array) -> Array:
+        """Lengths (k,) of residuals (k, c, 9) of the means, in their standard deviations."""
+        return np.sqrt(np.sum(self._blocks[0].used / self.variances(z)[0] * misses**2, axis=(1, 2)))
+
+    def displaced(self, z: Array, solution: ArrowSolution, misses: Array) -> Array:
+        """Changes (k, s) of the shared unknowns by residuals (k, c, 9) of the means alone."""
+        cells, count = self._blocks[0], len(misses)
+        weighed = cells.used / self.variances(z)[0] * misses
+        by_shared = weighed.reshape(count, -1) @ cells.A
+        by_local = cells.gather @ np.einsum("ckq,mck->cqm", cells.L, weighed).reshape(-1, count)
+        return np.asarray((by_shared - by_local.T @ solution.carried) @ solution.covariance)
 
     def likelihood(self, z: Array) -> float:
         """Restricted log likelihood with the prior of the components."""
