@@ -63,6 +63,12 @@ class ArrowSolution:
         """Covariance (l, l) of the unknowns of sections where the shared ones are known."""
         return np.asarray(cho_solve_banded((self._band, True), np.diag(self._scale)) * self._scale[:, None])
 
+    @property
+    def local_variance(self) -> Array:
+        """Variances (l,) of the unknowns of sections."""
+        by_shared = np.einsum("ls,st,lt->l", self.carried, self.covariance, self.carried)
+        return np.asarray(np.diag(self.given) + by_shared)
+
 
 class Linear:
     """The linear problem of a point, for any variances that nobody states.
@@ -182,7 +188,8 @@ class Linear:
 
     def weighed_misfits(self, z: Array, misses: Array) -> Array:
         """Lengths (k,) of residuals (k, c, 9) of the means, in their standard deviations."""
-        return np.sqrt(np.sum(self._blocks[0].used / self.variances(z)[0] * misses**2, axis=(1, 2)))
+        weighed = self._blocks[0].used / self.variances(z)[0] * misses**2
+        return np.asarray(np.sqrt(np.sum(weighed, axis=(1, 2))))
 
     def displaced(self, z: Array, solution: ArrowSolution, misses: Array) -> Array:
         """Changes (k, s) of the shared unknowns by residuals (k, c, 9) of the means alone."""
