@@ -102,13 +102,14 @@ def swings_of(
 
 
 def with_moves_between(rows: Sequence[SectionRow]) -> list[SectionRow]:
-    """The rows of one log with a move between each two rests that follow each other, unless a turn by a known angle, or
-    a known rate, lies between: never both for one motion."""
+    """The rows of one log with a move between each two rests that follow each other, unless a turn or a steady rate
+    lies between: never both for one motion, and a whole turn by a gyro in counts leaves its scale ambiguous."""
     rests = sorted((row for row in rows if row.kind == "rest"), key=lambda row: row.begin or 0.0)
+    turning = [row for row in rows if row.kind in ("turn", "rate")]
     moves = []
     for number, (first, last) in enumerate(pairwise(rests), 1):
         begin, end = first.end or 0.0, last.begin or 0.0
-        if not _told(rows, first.file, begin, end):
+        if not any((one.begin or 0.0) < end and (one.end or np.inf) > begin for one in turning):
             moves.append(SectionRow(f"move {number}", first.file, begin, end, "move", why="detected"))
     return sorted([*rows, *moves], key=lambda row: (row.begin or 0.0, row.kind))
 
