@@ -126,7 +126,8 @@ def test_one_log_with_six_sides_and_three_turns(seed):
     assert [side_of(row.axis)[1] for row in turns] == ["z", "y", "x"]
     assert all(abs(row.angle.value) == pytest.approx(2.0 * np.pi) for row in turns)
     assert len(found.sections) == 12
-    assert [question.code for question in found.questions] == ["whole_turns"]
+    assert found.questions == ()
+    assert [note.code for note in found.notes] == ["whole_turns"]
 
 
 def test_the_angle_of_turns_in_counts_is_asked_for():

@@ -186,6 +186,19 @@ class Linear:
         value = -0.5 * (size + 2.0 * known + volume + phi - gain)
         return ArrowSolution(shared, local, value, phi - gain, gain, covariance, carried, factor, scale)
 
+    def weighed_misfits(self, z: Array, misses: Array) -> Array:
+        """Lengths (k,) of residuals (k, c, 9) of the means, in their standard deviations."""
+        weighed = self._blocks[0].used / self.variances(z)[0] * misses**2
+        return np.asarray(np.sqrt(np.sum(weighed, axis=(1, 2))))
+
+    def displaced(self, z: Array, solution: ArrowSolution, misses: Array) -> Array:
+        """Changes (k, s) of the shared unknowns by residuals (k, c, 9) of the means alone."""
+        cells, count = self._blocks[0], len(misses)
+        weighed = cells.used / self.variances(z)[0] * misses
+        by_shared = weighed.reshape(count, -1) @ cells.A
+        by_local = cells.gather @ np.einsum("ckq,mck->cqm", cells.L, weighed).reshape(-1, count)
+        return np.asarray((by_shared - by_local.T @ solution.carried) @ solution.covariance)
+
     def likelihood(self, z: Array) -> float:
         """Restricted log likelihood with the prior of the components."""
         return self.at(z).value - 0.5 * float(np.sum(((z - self.sizes[:, 0]) / self.sizes[:, 1]) ** 2))

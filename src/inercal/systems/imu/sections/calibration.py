@@ -15,6 +15,7 @@ from inercal.foundation.inference.variances import degrees, second_moment, weigh
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
+from inercal.systems.imu.sections.bends import bend
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
@@ -167,7 +168,17 @@ def _calibrated(sections: Sequence[Section], priors: Priors, extras: tuple[Extra
 
 
 def _fit(problem: Problem) -> _Fit:
-    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes."""
+    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes.
+
+    Where noise is far below what coefficients and tilts do together, the valley of the sum of squares is too bent for
+    the search; what they take from lengths then counts as noise, and once more as curvature: u is on the safe side.
+    """
+    fitted = _fit_by(problem, whole=False)
+    return fitted if fitted.converged else _fit_by(problem, whole=True)
+
+
+def _fit_by(problem: Problem, *, whole: bool) -> _Fit:
+    """Solve; ``whole``: what coefficients leave open of tilts counts as noise as well."""
     z, point = np.array([np.log(size.median) for size in problem.sizes.values()]), first_guess(problem)
     spread, noise = np.eye(len(z)), _noise(problem, point, z)
     problem = with_classes(problem, noise)
@@ -182,7 +193,7 @@ def _fit(problem: Problem) -> _Fit:
             spread, axis=1
         )  # a scatter that may be small makes no fine instrument
         problem = with_classes(problem, _noise(problem, point, least_known))
-        point = _shortened(problem, point, linear, linear.at(z), z)
+        point = _shortened(problem, point, linear, linear.at(z), z, whole=whole)
     point, linear, converged = solved(problem, point, z)
     return _Fit(problem, point, linear, z, spread, converged)
 
@@ -215,12 +226,13 @@ def _noise(problem: Problem, point: Iterate, z: Array) -> dict[str, float]:
 
 
 def _shortened(
-    problem: Problem, point: Iterate, linear: Linear, solution: ArrowSolution, z: Array
+    problem: Problem, point: Iterate, linear: Linear, solution: ArrowSolution, z: Array, *, whole: bool
 ) -> Iterate:
-    """The point with the mean and the variance of the part by which tilts that the data leave open, within a known
-    placing, shorten what acts along a direction: (d1^2 + d2^2)/2."""
+    """The point with the mean and the variance of the part by which tilts that a section leaves open, within a known
+    placing, shorten what acts along a direction: (d1^2 + d2^2)/2. What coefficients leave open is for `bend`,
+    unless the ``whole`` is taken."""
     variance, sd = np.zeros(len(problem.sd)), np.zeros(len(problem.sd))
-    variance[linear.local] = solution.local_variance
+    variance[linear.local] = solution.local_variance if whole else np.diag(solution.given)
     sd[linear.local] = linear.sd(z)[len(linear.shared) :]
     left = np.where(np.isfinite(problem.local(sd)), problem.local(variance), 0.0)[problem.readings.leader]
     parts = [left[:, TILT], left[:, SWIVEL]]
@@ -238,8 +250,11 @@ def _result(fit: _Fit) -> SectionCalibration:
     found = [linear.at(z) for z in logs]
     prior = -0.5 * np.sum(((logs - linear.sizes[:, 0]) / linear.sizes[:, 1]) ** 2, axis=1)
     weights = weighed(np.array([each.value for each in found]) + prior + volume)
-    shifts = np.array([each.shared[:count] for each in found])
-    covariances = np.array([each.covariance[:count, :count] for each in found])
+    z = fit.z
+    best = linear.at(z)
+    curved = bend(problem, fit.point, linear, z, best)
+    shifts = np.array([(each.shared + curved.mean)[:count] for each in found])
+    covariances = np.array([(each.covariance + curved.covariance)[:count, :count] for each in found])
     mean = weights @ shifts
     covariance = second_moment(weights, covariances, shifts - mean)
     J, value = _in_outputs(names, x, x[at] + mean)
@@ -252,8 +267,6 @@ def _result(fit: _Fit) -> SectionCalibration:
     u = U / stdtrit(dof, 0.975)
     scale = u / np.sqrt(np.diag(covariance))
 
-    z = fit.z
-    best = linear.at(z)
     budget = _budget(problem, linear, best, z, J)
     left = linear.left(z, best)
     sd = linear.sd(z)[:count]

@@ -16,7 +16,8 @@ def pictures(calibration: CalibrationFromSections) -> list[Picture]:
     """Draw what there is to see of a calibration of any status; nothing where there was no fit."""
     estimate, found = calibration.estimate, calibration.found
     if found is None:
-        return []
+        swung = bool(estimate.names)
+        return [values(estimate), correlation(estimate), budget(estimate)] if swung else []
     return [_left(found), values(estimate), correlation(estimate), budget(estimate)]
 
 

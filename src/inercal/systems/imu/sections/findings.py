@@ -27,7 +27,7 @@ def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
     return (
         *_contradictions(found),
         *_signs(found),
-        *_outlying(found),
+        *(() if found.problem.extras else _outlying(found)),
         *_scatters(found),
         *_placing(found),
         *_by_prior(found),

@@ -48,6 +48,12 @@ class Limits:
     lever_arm: float = 0.1
     """Distance [m] of accelerometers from the axis of a unit that turns."""
 
+    visible_bend: float = 0.1
+    """Curvature along a combination of coefficients, in standard deviations of the means, from which it counts."""
+
+    most_bends: int = 12
+    """Combinations whose curvature counts at most."""
+
     # swings
 
     swing_window: float = 0.05

@@ -25,12 +25,17 @@ from inercal.foundation.units import RAW
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
+from inercal.systems.imu.sections.cutting.between import SwingStretch
+from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
+from inercal.systems.imu.sections.move_findings import findings_of_moves
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.swung import calibrate_swing
+from inercal.systems.imu.sections.with_moves import calibrate_with_moves
 from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
 
 MODEL = Formula(
@@ -75,21 +80,20 @@ def calibrate_from_sections(
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     proposal = _proposal(named, options)
     sections = tuple(_placed(section, options) for section in proposal.sections)
-    findings = (*_of_records(records), *proposal.questions)
+    findings = (*_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
     bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
     none: Mapping[str, Any] = {"method": "sections", "sections": []}
+    if not sections and proposal.swings:
+        progress("fitting the swing")
+        return CalibrationFromSections(
+            timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
+        )
     if not sections:
         text = "found no section that can be read: state them in a table, imu.sections"
         estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
-    priors = Priors(
-        settings.site,
-        clock_u=settings.time_base_u,
-        acc_scale=_scale(units["acc"]),
-        gyro_scale=_scale(units["gyro"]),
-        k2=math.inf if settings.k2 else settings.k2_u,
-    )
+    priors = _priors(settings, units)
     lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
@@ -99,13 +103,76 @@ def calibrate_from_sections(
         return CalibrationFromSections(timed(estimate, clock), sections)
     progress("fitting the sections")
     try:
-        found = calibrate_sections(sections, priors)
+        if proposal.moves:
+            moved = calibrate_with_moves(sections, [one.move for one in proposal.moves], priors)
+            found, findings = moved.calibration, (*findings, *findings_of_moves(moved, proposal.moves))
+        else:
+            found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     estimate = _estimate(found, settings, records, units, proposal, findings)
     return CalibrationFromSections(timed(estimate, clock), sections, found)
+
+
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
+    """Priors by what the study says of the site, the clock and the instrument."""
+    return Priors(
+        settings.site,
+        clock_u=settings.time_base_u,
+        acc_scale=_scale(units["acc"]),
+        gyro_scale=_scale(units["gyro"]),
+        k2=math.inf if settings.k2 else settings.k2_u,
+    )
+
+
+def _by_swing(
+    stretch: SwingStretch,
+    settings: ImuSettings,
+    records: Sequence[Record],
+    units: Mapping[str, Triad | None],
+    findings: Sequence[Finding],
+) -> Estimate:
+    """The estimate by a log in which nothing rests."""
+    sources = [source for record in records for source in record.sources]
+    bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
+    result: dict[str, Any] = {"method": "sections", "sections": []}
+    never = f"the instrument is never still for {CUTTING.shortest_hold:g} s, and as a swing it tells nothing"
+    try:
+        swung = calibrate_swing(stretch, _priors(settings, units))
+    except RecordError as error:
+        text = f"{never}: {error}"
+        return Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=result)
+    if swung.acc.refusal:
+        text = f"{never}: {swung.acc.refusal}"
+        return Estimate.without(bases, Status.INCONSISTENT, text, findings=findings, result=result)
+    g, symbols = settings.site.gravity, {s: t.unit.symbol for s, t in units.items() if t is not None}
+    ranges: dict[str, Any] = {"specific_force_along_an_axis_m_s2": [-g, g]}
+    conditions = conditions_of(settings, recorded_temperature(records[0]), ranges, frame=_OWN)
+    basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
+    names = swung.names
+    share = dict.fromkeys(names, 1.0)
+    item = BudgetItem("scatter of specific force in the swing", "A", swung.acc.scatter, "m/s^2", share, True)
+    row = {"section": stretch.name, "kind": "swing", "where": stretch.where, "why": "nothing rests"}
+    kept = [one for one in findings if one.code != "not_at_rest"]
+    return Estimate.of(
+        basis,
+        names,
+        [TERMS[name].unit_for(symbols["acc" if name.startswith(("K", "M")) else "gyro"]) for name in names],
+        swung.x,
+        Uncertainty(swung.covariance, np.full(len(names), swung.dof), (item,)),
+        (Status.OK, f"{len(names)} coefficients from {swung.acc.windows} windows of a swing"),
+        findings=(*kept, *swung.findings()),
+        statistics={"intervals": float(swung.acc.windows)},
+        result={
+            **result,
+            "sections": [row],
+            "by_prior": list(swung.acc.by_prior),
+            "scatter": {"acc": swung.acc.scatter},
+            "unit": symbols,
+        },
+    )
 
 
 def _named(records: Sequence[Record]) -> dict[str, Record]:
@@ -231,7 +298,7 @@ def _estimate(
         },
         result={
             "method": "sections",
-            "sections": _table(found),
+            "sections": [*_table(found), *_of_moves(proposal)],
             "unused": dict(proposal.unused),
             "by_prior": list(found.by_prior),
             "scatter": dict(found.scatter),
@@ -239,6 +306,11 @@ def _estimate(
             "unit": symbols,
         },
     )
+
+
+def _of_moves(proposal: Proposal) -> list[Mapping[str, Any]]:
+    """One row for each move."""
+    return [{"section": one.name, "kind": "move", "where": one.where, "why": ""} for one in proposal.moves]
 
 
 def _relative_alignment(found: SectionCalibration) -> list[Mapping[str, Any]]:

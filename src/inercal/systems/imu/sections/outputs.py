@@ -130,6 +130,14 @@ def misfit(problem: Problem, point: Iterate) -> Array:
     return np.where(problem.readings.seen, problem.readings.y - model, 0.0)
 
 
+def misfits(problem: Problem, point: Iterate, x: Array) -> Array:
+    """Outputs (k, n, 9) less those of the model at unknowns x (k, p); biases of sessions are those of the point."""
+    local = np.array([effective(problem, one) for one in x])
+    model = outputs(problem, point, x[:, :COMMON], local, _session_biases(problem, point.x))
+    left = np.where(problem.readings.seen, problem.readings.y - model, 0.0)
+    return np.asarray(left.reshape(*left.shape[:2], 9))
+
+
 def rows(problem: Problem, point: Iterate) -> tuple[RowBlock, ...]:
     """All rows of the linear problem at a point: means, and those of extras."""
     return (_means(problem, point), *(b for extra in problem.extras for b in extra.blocks(problem, point)))

@@ -43,7 +43,7 @@ def rows_of_log(
     ]
     if acc is not None:
         rests = with_sides(rests, np.array([hold.of(acc.values).mean(axis=0) for hold in holds]))
-    findings = [_unused(file, t, found.unused)] if found.unused else []
+    findings = [_unused(file, t, found.unused, len(holds))] if found.unused else []
     rows = rests
     if rate is not None:
         # without a rest the output at rate 0 is not known
@@ -102,11 +102,12 @@ def with_sides(rests: Sequence[SectionRow], means: Array) -> list[SectionRow]:
     return told
 
 
-def _unused(file: str, t: Array, unused: Sequence[UnusedHold]) -> Finding:
+def _unused(file: str, t: Array, unused: Sequence[UnusedHold], used: int) -> Finding:
     """The line about holds that are of no use."""
+    are = "is" if len(unused) == 1 else "are"
     return Finding(
         "poor_section",
-        f"{counted(len(unused), 'hold')} of {file} {'is' if len(unused) == 1 else 'are'} not used.",
+        f"{len(unused)} of {counted(len(unused) + used, 'hold')} of {file} {are} not used.",
         file,
         (),
         action="Hold the instrument still for a second or more where these poses matter.",

@@ -15,6 +15,14 @@ from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import RAW
 from inercal.systems.imu.rows import is_counted
+from inercal.systems.imu.sections.cutting.between import (
+    NamedMove,
+    SwingStretch,
+    as_a_swing,
+    moves_of,
+    swings_of,
+    with_moves_between,
+)
 from inercal.systems.imu.sections.cutting.checks import contradictions
 from inercal.systems.imu.sections.cutting.cut import Stretch, TriadSamples, cut
 from inercal.systems.imu.sections.cutting.holds import holds_of, steady_rates
@@ -34,6 +42,10 @@ class Proposal:
     sections: tuple[Section, ...]
     unused: dict[str, str]
     questions: tuple[Finding, ...]
+    notes: tuple[Finding, ...] = ()
+    """Findings that ask nothing and do no harm, such as holds of no use."""
+    moves: tuple[NamedMove, ...] = ()
+    swings: tuple[SwingStretch, ...] = ()
 
     @staticmethod
     def of(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Proposal:
@@ -72,9 +84,10 @@ class Proposal:
         sections += done.sections
         scales = {_scale(file.record) for file in files if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
-        return Proposal(
-            tuple(rows), tuple(sections), done.unused, (*questions, *contradictions(sections, scale))
-        )
+        asked = [*questions, *contradictions(sections, scale)]
+        notes = tuple(one for one in asked if not one.harm and one.code != "not_stated")
+        asked = [one for one in asked if one not in notes]
+        return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), notes)
 
     @staticmethod
     def by(rows: Sequence[SectionRow], records: Mapping[str, Record]) -> Proposal:
@@ -113,7 +126,25 @@ class Proposal:
         sections += done.sections
         scales = {_scale(file.record) for file in files.values() if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
-        return Proposal(tuple(rows), tuple(sections), done.unused, contradictions(sections, scale))
+        return Proposal._whole(rows, sections, recorded, done.unused, contradictions(sections, scale), ())
+
+    @staticmethod
+    def _whole(
+        rows: Sequence[SectionRow],
+        sections: Sequence[Section],
+        recorded: Mapping[str, RecordedTriads],
+        unused: Mapping[str, str],
+        questions: tuple[Finding, ...],
+        notes: tuple[Finding, ...],
+    ) -> Proposal:
+        """The proposal with the moves and swings that rows are of."""
+        triads = {name: (file.acc, file.gyro) for name, file in recorded.items()}
+        moves, no_moves = moves_of(rows, sections, triads)
+        swings = swings_of(rows, triads)
+        won = {one.name: "sections at rest tell more than a swing" for one in swings if sections}
+        return Proposal(
+            tuple(rows), tuple(sections), {**unused, **no_moves, **won}, questions, notes, moves, swings
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +208,12 @@ def _rows(file: RecordedTriads) -> tuple[list[SectionRow], list[Finding]]:
             return rows, _asked(file.name, rows)
     said = claim(file.name)
     if not said.kind:
-        return rows_of_log(file.name, file.acc, file.gyro, _scale(file.record))
+        found, asked = rows_of_log(file.name, file.acc, file.gyro, _scale(file.record))
+        if file.acc is None:
+            return found, asked
+        if not found:
+            return [as_a_swing(file.name, clock.t)], asked
+        return (with_moves_between(found) if file.gyro is not None else found), asked
     name = PurePosixPath(file.name.replace("\\", "/")).stem
     row = _of_claim(said, name, file.name, "name")
     if row.kind == "rest":
