@@ -16,14 +16,15 @@ HEAVY = {
 }  # fmt: skip
 """What takes a fiftieth of a second or more to load."""
 
-_FILES = {"cyclopts", "pydantic"}
-_KERNELS = {*_FILES, "numba", "scipy.special"}
+_FILES = {"cyclopts"}
+_STUDY = {*_FILES, "pydantic"}
+_KERNELS = {*_STUDY, "scipy.special"}
 STARTS = {
     "--version": set(),
     "--help": {"cyclopts", "rich"},
     "inspect model.csv": _FILES,
     "apply cal.toml log.csv --out corrected.csv": _FILES,
-    "calibrate turntable table.csv --study turntable.toml": {*_FILES, "scipy.special"},
+    "calibrate turntable table.csv --study turntable.toml": {*_STUDY, "scipy.special"},
     "sensitivity turntable.toml": _KERNELS,
     "selfcal platform.csv --study selfcal.toml": _KERNELS,
     "aoa model.csv --study aoa.toml": {*_KERNELS, "scipy.interpolate", "scipy.optimize"},

@@ -63,7 +63,7 @@ def test_an_input_error_in_a_validator_is_reported_after_its_key():
     class Picky(Strict):
         key: Annotated[str, BeforeValidator(refuse)]
 
-    with pytest.raises(MapError, match=r"^m.toml: key: found it, expected else$"):
+    with pytest.raises(MapError, match=r"^m.toml: key.x: found it, expected else$"):
         check(Picky, {"key": "a"}, "m.toml", MapError)
 
 

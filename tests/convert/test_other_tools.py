@@ -138,5 +138,5 @@ def test_a_file_that_is_missing_or_no_text_is_said(tmp_path):
     with pytest.raises(InputError, match=r"no\.json: cannot be read"):
         from_tool([tmp_path / "no.json"], "imucal")
     (tmp_path / "bytes.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"bytes\.json: found no text in UTF-8"):
+    with pytest.raises(InputError, match=r"bytes\.json: byte 0 is not UTF-8 text"):
         from_tool([tmp_path / "bytes.json"], "imucal")

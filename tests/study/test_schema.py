@@ -85,6 +85,7 @@ TWO_DIMENSIONS = {
     "rms": "of an angle, or of an acceleration",
     "range": "of an accelerometer, of a gyro",
     "z": "height of a sensor, limits of a gimbal",
+    "level": "axes to the vertical, level of an effect",
     **dict.fromkeys(DISTRIBUTIONS, "errors of a table that are angles, and the offset of its axes"),
 }
 

@@ -40,7 +40,9 @@ Use = Literal["file", "value", "below", "dropped", "refused"]
 OPTIONS_AGAIN: Mapping[str, Use] = {
     **dict.fromkeys(("FILES", "STUDY", "FIRST", "SECOND", "OF"), "file"),
     **dict.fromkeys(("--study", "--map", "--join", "--runs", "--tolerance"), "file"),
-    **dict.fromkeys(("--set", "--begin", "--end", "--at", "--filter", "--compare", "--states"), "value"),
+    **dict.fromkeys(
+        ("--set", "--begin", "--end", "--at", "--order", "--filter", "--compare", "--states"), "value"
+    ),
     **dict.fromkeys(("--static", "--centrifugal", "--tangential", "--smooth", "--points"), "value"),
     **dict.fromkeys(("--seed", "--coefficient", "--until", "simulate selfcal --runs"), "value"),
     **dict.fromkeys(("--out", "--report"), "below"),

@@ -87,7 +87,7 @@ CODES: dict[str, Code] = {
     "turn_doubtful": Code("which motion is a turn is not certain", _NEVER),
     "outlying_pose": Code("a static pose lies off what all others say", _BY_SIZE),
     "outlying_section": Code("a section lies off what all others say", _BY_SIZE),
-    "sections_contradict": Code("sections contradict what is said of them", _ALWAYS, rank=14),
+    "sections_contradict": Code("sections contradict what is said of them", _ALWAYS, rank=24),
     "large_placing": Code("a section lies far off the direction or axis that is said of it", _BY_SIZE),
     "one_setup": Code("several rates about one side are taken to be placed anew each time", _BY_SIZE),
     "by_prior": Code("terms rest on what was known before rather than on the data", _NEVER),

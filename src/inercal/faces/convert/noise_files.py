@@ -72,6 +72,7 @@ def noise_to_tool(estimate: Estimate, tool: str, where: object) -> Converted:
                 f"the random walk of {len(limited)} channels was not seen: its upper limit is written",
                 action="record longer at rest, at a steady temperature, to see it",
                 items=tuple({"coefficient": name} for name in limited),
+                harm=(),
             ),
         )
     names = tuple(values)

@@ -62,6 +62,7 @@ def rows_of_log(
                 f"{file} is never held still for {LIMITS.shortest_hold:g} s, calmest at {t[found.calmest]:.1f} s.",
                 file,
                 action="Hold the instrument still in each pose for a second or more.",
+                harm=(),
             )
         )
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
@@ -158,6 +159,7 @@ def _plateaus(
                 f"{about}.",
                 file,
                 action="Write their rate into the column `rate` of sections.csv.",
+                harm=(),
             )
         )
     return [replace(rows[k], section=f"rate {n}") for n, k in enumerate(sorted(rows), 1)], findings
@@ -218,6 +220,7 @@ def _turns(
                 f"The angle of {counted(len(asked), 'turn')} of {file} is not known.",
                 file,
                 action="Write it into the column `angle` of sections.csv, with its sign.",
+                harm=(),
             )
         )
     return rows, findings

@@ -241,7 +241,9 @@ def _held(
     if not holds:
         why = found.unused[0].why if found.unused else f"it is never still for {LIMITS.shortest_hold:g} s"
         headline = f"{row.section} is not held still: {why}."
-        return [], [Finding("not_at_rest", headline, file.name, action="Record this side again, at rest.")]
+        return [], [
+            Finding("not_at_rest", headline, file.name, action="Record this side again, at rest.", harm=())
+        ]
     longest = max(holds, key=lambda hold: hold.samples)
     begin, end = float(clock.t[longest.start]), float(clock.t[longest.stop - 1])
     whole = longest.samples > (1.0 - LIMITS.cut_of_rest) * len(clock.t)
@@ -280,7 +282,9 @@ def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:
         return []
     headline = f"The angle of {counted(len(turns), 'turn')} of {file} is not known."
     action = "Write it into the column `angle` of sections.csv, with its sign."
-    return [Finding("not_stated", headline, counted_names([row.section for row in turns]), action=action)]
+    return [
+        Finding("not_stated", headline, counted_names([row.section for row in turns]), action=action, harm=())
+    ]
 
 
 def _named_apart(rows: Sequence[SectionRow], several: bool) -> list[SectionRow]:
