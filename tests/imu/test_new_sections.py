@@ -116,6 +116,17 @@ def test_one_log_of_six_rests_and_three_turns(folder):
             assert values[name]["u"] < 0.01
 
 
+def test_rows_of_means_are_sections(folder):
+    unit = Unit(np.random.default_rng(5), gravity=9.80880)
+    rows = [Bench(unit).rest(up).acc for up in SIDES.values()]
+    written(folder / "means.csv", HEAD.partition(",")[2], np.array(rows))
+    assert run(["new", "imu", "means.csv", *SITE]) == 0
+    assert method() == "sections"
+    assert len(read_table("sections.csv")) == 6
+    code, _ = calibrated(["means.csv"], "--map", "imu-map.toml")
+    assert code == 0
+
+
 def test_other_protocols_begin_as_before(folder):
     """Poses in the hand and labels keep their methods, a stated method is kept, and no table is written."""
     t, acc, gyro, _ = held(21)

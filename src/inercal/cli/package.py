@@ -67,6 +67,7 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
     from inercal.faces.python.beginning import begun, mapped, sections_of
     from inercal.faces.studies.starting import UNKNOWN
     from inercal.foundation._files import write_text
+    from inercal.foundation.records.guess import of_means
     from inercal.foundation.records.read import source_of
     from inercal.foundation.units import parse_quantity
 
@@ -86,7 +87,8 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
     asked = () if told is None else told[1]
     if table is not None:
         keys = ['imu.method="sections"', f"imu.sections={table}", *overrides]
-        text, column_map = begun(kind, files, study, beside, rate, keys)
+        text, _ = begun(kind, files, study, beside, rate, keys)
+        column_map = None if column_map is None else of_means(column_map)
     contents = {study: text}
     if map_file is not None and column_map is not None:
         contents[map_file] = column_map

@@ -46,6 +46,7 @@ def sections_of(
     None where they are not evaluated by sections, or cannot be read until the map is corrected.
     """
     from inercal.foundation._files import write_text
+    from inercal.foundation.records.guess import of_means
     from inercal.foundation.records.read import read_runs
 
     sections = SYSTEMS[kind].sections
@@ -54,7 +55,7 @@ def sections_of(
     with tempfile.TemporaryDirectory() as folder:
         map_file = None if column_map is None else Path(folder) / "map.toml"
         if map_file is not None and column_map is not None:
-            write_text(map_file, column_map)
+            write_text(map_file, of_means(column_map))
         try:
             return sections(read_runs(files, map_file, counted=True))
         except InputError:
