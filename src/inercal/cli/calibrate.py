@@ -108,9 +108,12 @@ def _calibrated(
     output.check(WHOLE, (*files, map_file, study))
     the_study, _ = study_in(kind, study, overrides, output)
     clock = time.perf_counter()
-    records = read_repeats(files, map_file, output, span, the_study.system.counted(the_study.settings))
-    read_s = time.perf_counter() - clock
     system = the_study.system
+    if system.sections is not None:  # the table of sections is no recording, though `*.csv` takes it in
+        tables = {path.resolve() for path in the_study.files}
+        files = [file for file in files if file.resolve() not in tables]
+    records = read_repeats(files, map_file, output, span, system.counted(the_study.settings))
+    read_s = time.perf_counter() - clock
     if system.prepare:
         from inercal.foundation._jit import compiling
 

@@ -64,9 +64,10 @@ def new_lab(
 
 def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
-    from inercal.faces.python.study import begun, mapped
+    from inercal.faces.python.beginning import begun, mapped, sections_of
     from inercal.faces.studies.starting import UNKNOWN
     from inercal.foundation._files import write_text
+    from inercal.foundation.records.guess import of_means
     from inercal.foundation.records.read import source_of
     from inercal.foundation.units import parse_quantity
 
@@ -80,20 +81,34 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
     beside = study.with_name(f"{study.stem}-map{study.suffix}")
     text, column_map = begun(kind, files, study, beside, rate, overrides)
     map_file = None if column_map is None else beside
-    written = [study] if map_file is None else [study, map_file]
-    for path in written:
+    stated = any(override.strip().startswith(("imu.method", "imu.section")) for override in overrides)
+    told = None if stated else sections_of(kind, files, column_map)
+    table = None if told is None else study.with_name("sections.csv")
+    asked = () if told is None else told[1]
+    if table is not None:
+        keys = ['imu.method="sections"', f"imu.sections={table}", *overrides]
+        text, _ = begun(kind, files, study, beside, rate, keys)
+        column_map = None if column_map is None else of_means(column_map)
+    contents = {study: text}
+    if map_file is not None and column_map is not None:
+        contents[map_file] = column_map
+    if table is not None and told is not None:
+        contents[table] = told[0]
+    for path in contents:
         if path.exists():
             raise InputError(path, "exists already, expected a new file name (--out)")
-    write_text(study, text)
-    if map_file is not None and column_map is not None:
-        write_text(map_file, column_map)
+    for path, content in contents.items():
+        write_text(path, content)
     result = {"study": str(study), "map": None if map_file is None else str(map_file)}
-    words = "\n".join(f"{path}: look it over and correct it" for path in written)
+    if table is not None:
+        result["sections"] = str(table)
+    words = "\n".join(f"{path}: look it over and correct it" for path in contents)
     if f'= "{UNKNOWN}" ' in text:
         words = words.replace("look it over and correct it", f'fill in each "{UNKNOWN}" and look it over', 1)
     if column_map is not None and not mapped(column_map):
         words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
-    tell(output, f"new {kind}", words, result, map(source_of, files))
+    words = "\n".join([words, *(question.line for question in asked)])
+    tell(output, f"new {kind}", words, result, map(source_of, files), findings=asked)
 
 
 def validate(*, output: ResultOutput = ResultOutput()) -> int:

@@ -23,8 +23,8 @@ COMMANDS = {
     ("new", "imu"): (
         "inercal.cli.package:new_imu",
         "Write a commented study for `inercal calibrate imu`.\n\nGiven a recording, also a column map guessed from "
-        "it. The study goes to --out (imu.toml if absent), the map beside it (imu-map.toml). Nothing that exists "
-        "is overwritten.",
+        "it, and a table of sections (sections.csv) where names of files or the data tell them. The study goes to "
+        "--out (imu.toml if absent), the others beside it. Nothing that exists is overwritten.",
         'inercal new imu log.csv --set site.latitude="48.1 deg" --out imu.toml',
     ),
     ("new", "strapdown"): (

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from inercal.foundation._toml import Strict
     from inercal.foundation.arrays import Array
     from inercal.foundation.designs.foresight import Foresight
+    from inercal.foundation.findings import Finding
     from inercal.foundation.records.record import Record
     from inercal.foundation.results.result import Estimate
 
@@ -78,6 +79,8 @@ class System:
     """Keys in force of a new study for a recording with these channels."""
     first: str
     """Command to begin with where there is no recording, of ``{study}`` and ``{files}``."""
+    sections: Callable[[Sequence[Record]], tuple[str, tuple[Finding, ...]] | None] | None = None
+    """Table of sections beside a new study, as text, and what is asked about it; None for records without sections."""
     rigs: tuple[str, ...] = ()
     """Values of ``rig.kind`` that tell the kind of a study."""
     table: str = ""

@@ -99,7 +99,7 @@ class Bench:
 
         Raises `InputError` where the recordings cannot be read or the kind is none.
         """
-        from inercal.faces.python.study import begun, kind_of_record
+        from inercal.faces.python.beginning import begun, kind_of_record
 
         plain("rate", rate or "")
         names = session.recordings

@@ -1,6 +1,6 @@
 """Studies, of a TOML file or of the same keys as keywords: to begin with, and for tasks on records.
 
-A study to begin with, and a column map, are guessed from the recordings. A study that plans a test tells before it is
+A study that plans a test tells before it is
 made which uncertainties to expect, and where it stops.
 """
 
@@ -28,7 +28,7 @@ from inercal.systems.listed import SYSTEMS
 from inercal.systems.turntable.system import SYSTEM as TURNTABLE
 
 if TYPE_CHECKING:
-    from inercal.foundation.units import Unit
+    pass
 
 
 KINDS = tuple(SYSTEMS)
@@ -341,54 +341,3 @@ def verticals(study: Study) -> Array:
 def _without_plan(study: Study) -> StudyError:
     """The refusal of a study that plans no test."""
     return StudyError(study.path or "study", f"found the kind {study.kind}, expected one with a plan")
-
-
-def begun(
-    kind: str,
-    files: Sequence[Path],
-    study: Path,
-    map_file: Path,
-    rate: str | None = None,
-    overrides: Iterable[str] = (),
-) -> tuple[str, str | None]:
-    """A commented study of that kind, and a map of the recordings, None where their headers say what they hold.
-
-    ``study`` and ``map_file`` are the paths that its words name; ``rate`` is the sample rate, as text with its unit,
-    of recordings without times; ``overrides`` as of ``--set``. Raises `RecordError` and `StudyError`.
-    """
-    from inercal.faces.studies.template import template
-
-    channels, column_map = _described(SYSTEMS[kind], files, rate)
-    named = None if column_map is None else map_file
-    return template(kind, files, study, named, channels, overrides), column_map
-
-
-def kind_of_record(files: Sequence[Path]) -> str:
-    """The kind of study that recordings with canonical headers are for: that of an IMU where they do not tell."""
-    from inercal.foundation.records.read import canonical_units
-
-    channels = canonical_units(list(files)) or {}
-    return next((kind for kind, system in SYSTEMS.items() if system.tells(channels)), IMU.kind)
-
-
-def _described(
-    system: System, files: Sequence[Path], rate: str | None
-) -> tuple[Mapping[str, Unit | None], str | None]:
-    """Channels of the recordings, with their units where known, and a map where the headers do not say these."""
-    from inercal.foundation.records.guess import guess_map
-    from inercal.foundation.records.read import canonical_units
-
-    if not files:
-        return {}, None
-    channels = canonical_units(files) or {}
-    if system.complete(channels):
-        return channels, None
-    column_map = guess_map(files, **system.guess, rate=rate)
-    return dict.fromkeys(mapped(column_map)), column_map
-
-
-def mapped(column_map: str) -> list[str]:
-    """The channels of a map."""
-    data = tomllib.loads(column_map)
-    parts = [data, *(part for part in data.get("file", {}).values() if isinstance(part, dict))]
-    return [name for part in parts for name in part.get("columns", ())]

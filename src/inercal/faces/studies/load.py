@@ -41,7 +41,10 @@ _ONE_OF = (
 )
 
 #: keys (a regular expression) that name a file
-_FILES = r"estimator\.prior|motion\.file|positions\.file|rig\.errors\.\w+\.table|sensors\.\w+\.calibration"
+_FILES = (
+    r"estimator\.prior|imu\.sections|motion\.file|positions\.file|rig\.errors\.\w+\.table"
+    r"|sensors\.\w+\.calibration"
+)
 
 
 #: dotted key that a new study leaves open -> an example

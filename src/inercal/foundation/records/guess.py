@@ -31,6 +31,7 @@ _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
 _LISTED = 40
+_OPEN_RATE = ("# there is no time column", "[time]", 'rate = "PUT THE SAMPLE RATE HERE, such as 100 Hz"')
 _HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
 
@@ -92,6 +93,11 @@ def guess_map(
     if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
         lines += _rate([line for file in files for line in file.leading], rate)
     return "\n".join(lines) + "\n"
+
+
+def of_means(column_map: str) -> str:
+    """The map without the sample rate that is to be filled in: rows of means need no times."""
+    return column_map.replace("\n" + "\n".join(_OPEN_RATE), "")
 
 
 def columns_of(path: Path) -> tuple[Origin, ...]:
@@ -321,7 +327,7 @@ def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
             "[time]",
             f'rate = "{match[1]} Hz"',
         ]
-    return ["", "# there is no time column", "[time]", 'rate = "PUT THE SAMPLE RATE HERE, such as 100 Hz"']
+    return ["", *_OPEN_RATE]
 
 
 def _table_names(files: Sequence[_File]) -> list[str]:

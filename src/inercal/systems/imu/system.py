@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from inercal.faces.stream.estimators import Make, Say, SayFinding
     from inercal.faces.validate.case import Case
     from inercal.foundation._toml import Strict
+    from inercal.foundation.findings import Finding
     from inercal.foundation.records.record import Record
     from inercal.systems.imu.settings import ImuSettings
 
@@ -36,6 +37,12 @@ def _new_study(channels: Channels) -> dict[str, Any]:
     from inercal.faces.studies.starting import imu_study
 
     return imu_study(channels)
+
+
+def _sections(records: Sequence[Record]) -> tuple[str, tuple[Finding, ...]] | None:
+    from inercal.systems.imu.sections.beginning import beginning
+
+    return beginning(records)
 
 
 def _counted(settings: ImuSettings) -> bool:
@@ -78,6 +85,7 @@ SYSTEM = System(
     read_study=_read_study,
     study_file=_study_file,
     new_study=_new_study,
+    sections=_sections,
     first="calibrate imu {files}",
     table="imu",
     counted=_counted,

@@ -75,8 +75,8 @@ def calibrate_from_sections(
     """
     clock = time.perf_counter()
     progress("reading the sections")
-    named = _named(records)
-    _refuse_samples(named)
+    named = by_file(records)
+    refuse_samples(named)
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     proposal = _proposal(named, options)
     sections = tuple(_placed(section, options) for section in proposal.sections)
@@ -175,7 +175,7 @@ def _by_swing(
     )
 
 
-def _named(records: Sequence[Record]) -> dict[str, Record]:
+def by_file(records: Sequence[Record]) -> dict[str, Record]:
     """The records by the names of their files."""
     named: dict[str, Record] = {}
     for record in records:
@@ -198,8 +198,11 @@ def _unit(sensor: str, records: Sequence[Record]) -> Triad | None:
     return triads[0] if triads else None
 
 
-def _refuse_samples(named: Mapping[str, Record]) -> None:
-    """Refuse rows without times that are samples of a recording: most of many are like the one before."""
+def refuse_samples(named: Mapping[str, Record]) -> None:
+    """Refuse rows without times that are samples of a recording: most of many are like the one before.
+
+    Raises `RecordError`.
+    """
     for name, record in named.items():
         sensor = "acc" if "acc_x" in record else "gyro"
         if not is_counted(record) or f"{sensor}_z" not in record:

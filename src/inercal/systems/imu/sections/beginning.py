@@ -1,0 +1,39 @@
+"""The table of sections that a new study begins with, where recordings tell one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from inercal.foundation.errors import InputError
+from inercal.foundation.findings import Finding
+from inercal.foundation.records.record import Record
+from inercal.systems.imu.rows import is_counted
+from inercal.systems.imu.sections.cutting.proposal import Proposal
+from inercal.systems.imu.sections.cutting.table import table_text
+from inercal.systems.imu.sections.cutting.words import claim
+from inercal.systems.imu.sections.outcome import by_file, refuse_samples
+
+
+def beginning(records: Sequence[Record]) -> tuple[str, tuple[Finding, ...]] | None:
+    """The text of ``sections.csv`` for recordings, and what is asked about it.
+
+    None where another method serves them: angles of a table, labels, poses in the hand with moves between them, rows
+    without times that are samples.
+    """
+    named = by_file(records)
+    if any(record.labels or "phi1" in record for record in records) or not _told(named):
+        return None
+    try:
+        refuse_samples(named)
+        found = Proposal.of(named)
+    except InputError:
+        return None
+    one_log = len(named) == 1 and not is_counted(records[0]) and not claim(next(iter(named))).kind
+    if not found.rows or (one_log and all(row.up is None for row in found.rows)):
+        return None
+    return table_text(found.rows), found.questions
+
+
+def _told(named: Mapping[str, Record]) -> bool:
+    """True of one recording, and of several where a name says what its file holds, or one is a table of means."""
+    return len(named) == 1 or any(claim(name).kind or is_counted(record) for name, record in named.items())

@@ -1,0 +1,159 @@
+"""`inercal new imu` proposes sections that `inercal calibrate imu` takes as they are."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from held_recordings import Handling, held
+from turned_units import SIDES, Bench, Unit
+
+from inercal.cli import run
+from inercal.systems.imu.sections.cutting.table import read_table, side_of
+
+SITE = ["--set", "site.latitude=48 deg", "--quiet"]
+HEAD = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def written(path, head, *columns):
+    rows = np.column_stack(columns)
+    path.write_text(head + "\n" + "".join(",".join(f"{v:.6f}" for v in row) + "\n" for row in rows))
+
+
+def six_files(folder, head, scale=1.0, **other):
+    """A file for each side, named after it, and the unit."""
+    unit = Unit(np.random.default_rng(6), gravity=9.80880)
+    for side, up in SIDES.items():
+        up = SIDES[other.get(side[1] + ("up" if side[0] == "+" else "down"), side)] if other else up
+        acc = Bench(unit, acc_noise=0.0, placing=1e-3).rest(up).acc + unit.rng.normal(0, 0.01, (600, 3))
+        written(
+            folder / f"{side[1]}_{'up' if side[0] == '+' else 'down'}.csv",
+            head,
+            0.01 * np.arange(600),
+            scale * acc,
+        )
+    return unit
+
+
+def csvs(folder):
+    return sorted(path.name for path in folder.glob("*.csv"))
+
+
+def calibrated(files, *more):
+    code = run(["calibrate", "imu", *files, *more, "--study", "imu.toml", "--quiet", "--out", "out.json"])
+    return code, json.loads(open("out.json", encoding="utf-8").read())
+
+
+def method():
+    return tomllib.loads(open("imu.toml", encoding="utf-8").read())["imu"]["method"]
+
+
+def test_six_files_by_name_take_two_commands(folder):
+    """`new imu *.csv`, then `calibrate imu *.csv`: the table beside the study is no recording."""
+    unit = six_files(folder, HEAD)
+    assert run(["new", "imu", *csvs(folder), *SITE]) == 0
+    assert {row.file: side_of(row.up) for row in read_table("sections.csv")} == {
+        f"{side[1]}_{'up' if side[0] == '+' else 'down'}.csv": side for side in SIDES
+    }
+    assert {row.why for row in read_table("sections.csv")} == {"name"}
+    assert "sections.csv" in csvs(folder)
+    more = ["--map", "imu-map.toml"] if (folder / "imu-map.toml").exists() else []
+    code, result = calibrated(csvs(folder), *more)
+    assert code == 0
+    assert "sections.csv" in {source["path"].split("/")[-1] for source in result["inputs"]}
+    for axis in "xyz":
+        for name in (f"K0_{axis}", f"K1_{axis}"):
+            found = next(p for p in result["parameters"] if p["name"] == name)
+            assert abs(found["value"] - unit.truth[name]) < 4.0 * found["u"]
+
+
+def test_files_of_bare_columns_get_a_map_and_the_same_sections(folder):
+    six_files(folder, "time,ax,ay,az")
+    assert run(["new", "imu", *csvs(folder), *SITE]) == 0
+    assert (folder / "imu-map.toml").exists()
+    assert method() == "sections"
+    assert len(read_table("sections.csv")) == 6
+    code, _ = calibrated(csvs(folder), "--map", "imu-map.toml")
+    assert code == 0
+
+
+def test_a_side_taken_twice_is_asked(folder, capsys):
+    """What the data contradict is printed with what to do."""
+    six_files(folder, HEAD, zup="-z")
+    capsys.readouterr()
+    assert run(["new", "imu", *csvs(folder), *SITE[:2]]) == 0
+    out = capsys.readouterr()
+    assert "z_down" in out.out + out.err
+
+
+def log_of_sides_and_turns(folder):
+    quarter, whole = 0.5 * np.pi, 2.0 * np.pi
+    moves = [
+        (0.0, 0.0, whole), (quarter, 0.0, 0.0), (0.0, whole, 0.0), (quarter, 0.0, 0.0), (quarter, 0.0, 0.0),
+        (0.0, 0.0, quarter), (whole, 0.0, 0.0), (0.0, 0.0, np.pi),
+    ]  # fmt: skip
+    t, acc, gyro, _ = held(1, Handling(9, rest=(3.0, 4.0), move=(3.0, 4.0)), moves)
+    head = HEAD + ",gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]"
+    written(folder / "log.csv", head, t, acc, gyro)
+
+
+def test_one_log_of_six_rests_and_three_turns(folder):
+    """Right numbers: K1 and S as simulated, within 4 u, u(S) below 1 %."""
+    log_of_sides_and_turns(folder)
+    assert run(["new", "imu", "log.csv", *SITE]) == 0
+    assert method() == "sections"
+    _, result = calibrated(["log.csv"])
+    values = {p["name"]: p for p in result["parameters"]}
+    for axis in "xyz":
+        for name, truth in ((f"K1_{axis}", 1.01), (f"S_{axis}", 1.0)):
+            assert abs(values[name]["value"] - truth) < 4.0 * values[name]["u"], name
+            assert values[name]["u"] < 0.01
+
+
+def test_rows_of_means_are_sections(folder):
+    unit = Unit(np.random.default_rng(5), gravity=9.80880)
+    rows = [Bench(unit).rest(up).acc for up in SIDES.values()]
+    written(folder / "means.csv", HEAD.partition(",")[2], np.array(rows))
+    assert run(["new", "imu", "means.csv", *SITE]) == 0
+    assert method() == "sections"
+    assert len(read_table("sections.csv")) == 6
+    code, _ = calibrated(["means.csv"], "--map", "imu-map.toml")
+    assert code == 0
+
+
+def test_other_protocols_begin_as_before(folder):
+    """Poses in the hand and labels keep their methods, a stated method is kept, and no table is written."""
+    t, acc, gyro, _ = held(21)
+    head = HEAD + ",gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]"
+    written(folder / "hand.csv", head, t, acc, gyro)
+    log_of_sides_and_turns(folder)
+    lines = (folder / "log.csv").read_text().splitlines()
+    (folder / "labelled.csv").write_text(
+        "\n".join([f"{lines[0]},label", *(f"{line},x_p" for line in lines[1:])])
+    )
+    for files, keys, expected in (
+        (["hand.csv"], [], "multiposition"),
+        (["labelled.csv"], [], "ferraris"),
+        (["log.csv"], ["--set", "imu.method=multiposition"], "multiposition"),
+    ):
+        assert run(["new", "imu", *files, *SITE, *keys]) == 0
+        assert method() == expected
+        assert not (folder / "sections.csv").exists()
+        for path in folder.glob("*.toml"):
+            path.unlink()
+
+
+def test_nothing_is_written_where_a_table_is_there(folder, capsys):
+    six_files(folder, HEAD)
+    files = csvs(folder)
+    (folder / "sections.csv").write_text("mine\n")
+    assert run(["new", "imu", *files, *SITE]) == 2
+    assert "sections.csv: exists already" in capsys.readouterr().err
+    assert not (folder / "imu.toml").exists()
+    assert (folder / "sections.csv").read_text() == "mine\n"
