@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.findings import Finding
+from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.section import Section
@@ -74,7 +74,7 @@ def _of_rests(sections: Sequence[Section]) -> list[Finding]:
                 "Every rest stands on the side opposite to its name.",
                 counted_names([one.where for one in whole]),
                 action="Say whether the outputs show gravity, down: then give acc the sign - in the map.",
-                harm=(),
+                harm=EVERYTHING,
             )
         ]
     wrong = [k for k in range(len(whole)) if cosines[k] < np.cos(LIMITS.side)]
@@ -97,7 +97,7 @@ def _turning_rests(sections: Sequence[Section]) -> Iterator[Finding]:
                 f"The gyro turns in {one.name}: {size / float(np.median(off)):.0f} times as far off as in other rests.",
                 one.where,
                 action="Take it out, or state it as kind `rate` with its rate.",
-                harm=(),
+                harm=EVERYTHING,
             )
 
 
@@ -120,7 +120,7 @@ def _taken_twice(one: Section, other: Section, whole: Sequence[Section]) -> Find
         f"{one.name} and {other.name} hold the same side{said}.",
         f"{one.where} and {other.where}",
         action=f"Record the side of {wrong.name} again, or correct its name.",
-        harm=(),
+        harm=EVERYTHING,
     )
 
 
@@ -131,7 +131,7 @@ def _other_unit(section: Section, size: float) -> Finding:
         f"{section.name} reads {size:.3g} times the gravity of the other rests.",
         section.where,
         action="Say in the map which unit this file has.",
-        harm=(),
+        harm=EVERYTHING,
     )
 
 
@@ -147,7 +147,7 @@ def _elsewhere(section: Section, force: Array) -> Finding:
         f"{section.name} stands {off}.",
         section.where,
         action=f"Correct its name or `up`, or say in the map which column is acc_{found[1]} and with which sign.",
-        harm=(),
+        harm=EVERYTHING,
     )
 
 
@@ -180,7 +180,7 @@ def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iter
                 f"{one.name} turns about {_LETTERS[k]}, not about {_LETTERS[axis]}.",
                 one.where,
                 action="Correct its name or `axis`, or say in the map which column is which axis of the gyro.",
-                harm=(),
+                harm=EVERYTHING,
             )
         else:
             gains.append((one, float(off @ one.axis) / _rate(one)))
@@ -197,7 +197,7 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
             "Every rate or turn has the sign opposite to what is stated.",
             counted_names([one.where for one, _ in gains]),
             action="Say whether rates are counted against the right-hand rule, or give gyro the sign - in the map.",
-            harm=(),
+            harm=EVERYTHING,
         )
         return
     usual = gyro_scale if gyro_scale is not None else float(np.median([abs(gain) for _, gain in gains]))
@@ -211,7 +211,7 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
                 f"{one.name} turns the other way than its {what} says, about {_letter(one)}.",
                 one.where,
                 action=f"Correct the sign of its `{what}` or `axis`.",
-                harm=(),
+                harm=EVERYTHING,
             )
         elif abs(gain / usual - 1.0) > LIMITS.rate_miss:
             found, said = np.degrees(stated * gain / usual), np.degrees(stated)
@@ -220,7 +220,7 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
                 f"{one.name} is stated as {said:.6g} {unit}, and the gyro reads about {found:.4g} {unit}.",
                 one.where,
                 action=f"Correct its `{what}`, or the unit of the gyro in the map.",
-                harm=(),
+                harm=EVERYTHING,
             )
 
 

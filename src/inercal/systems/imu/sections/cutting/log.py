@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.findings import Finding
+from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted
 from inercal.systems.imu.sections.cutting.checks import direction
@@ -62,7 +62,7 @@ def rows_of_log(
                 f"{file} is never held still for {LIMITS.shortest_hold:g} s, calmest at {t[found.calmest]:.1f} s.",
                 file,
                 action="Hold the instrument still in each pose for a second or more.",
-                harm=(),
+                harm=EVERYTHING,
             )
         )
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
@@ -159,7 +159,7 @@ def _plateaus(
                 f"{about}.",
                 file,
                 action="Write their rate into the column `rate` of sections.csv.",
-                harm=(),
+                harm=EVERYTHING,
             )
         )
     return [replace(rows[k], section=f"rate {n}") for n, k in enumerate(sorted(rows), 1)], findings
@@ -220,7 +220,7 @@ def _turns(
                 f"The angle of {counted(len(asked), 'turn')} of {file} is not known.",
                 file,
                 action="Write it into the column `angle` of sections.csv, with its sign.",
-                harm=(),
+                harm=EVERYTHING,
             )
         )
     return rows, findings

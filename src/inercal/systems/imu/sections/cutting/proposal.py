@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.findings import Finding
+from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
@@ -242,7 +242,9 @@ def _held(
         why = found.unused[0].why if found.unused else f"it is never still for {LIMITS.shortest_hold:g} s"
         headline = f"{row.section} is not held still: {why}."
         return [], [
-            Finding("not_at_rest", headline, file.name, action="Record this side again, at rest.", harm=())
+            Finding(
+                "not_at_rest", headline, file.name, action="Record this side again, at rest.", harm=EVERYTHING
+            )
         ]
     longest = max(holds, key=lambda hold: hold.samples)
     begin, end = float(clock.t[longest.start]), float(clock.t[longest.stop - 1])
@@ -283,7 +285,13 @@ def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:
     headline = f"The angle of {counted(len(turns), 'turn')} of {file} is not known."
     action = "Write it into the column `angle` of sections.csv, with its sign."
     return [
-        Finding("not_stated", headline, counted_names([row.section for row in turns]), action=action, harm=())
+        Finding(
+            "not_stated",
+            headline,
+            counted_names([row.section for row in turns]),
+            action=action,
+            harm=EVERYTHING,
+        )
     ]
 
 
