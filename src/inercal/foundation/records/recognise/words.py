@@ -78,8 +78,9 @@ def words_of(name: str) -> list[str]:
     name = re.sub(r"\[([012])\]", lambda index: f" {'xyz'[int(index[1])]} ", name)
     name = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})|(?<=[一-鿿])(?=[A-Za-z])", " ", name)
     parted = []
-    for word in re.findall(r"[a-z一-鿿]+|\d+", name.lower()):
-        if word in ("gy", "velocity", "gravity"):
+    words = re.findall(r"[a-z一-鿿]+|\d+", name.lower())
+    for word, after in zip(words, [*words[1:], ""], strict=True):
+        if word in ("velocity", "gravity") or (word == "gy" and after in ("x", "y", "z")):
             parted.append(word)  # the last letter is no axis
         elif match := re.fullmatch(r"([xyz])(gyro\w*|acc\w*|mag\w*)", word):
             parted += [match[2], match[1]]
