@@ -58,6 +58,9 @@ def written(path, head, rows, delimiter=","):
         ("gX [mg]", "acc", "x", "mg"),
         ("mag_x", "mag", "x", ""),
         ("vel_x", "other", "x", ""),
+        ("GyX", "gyro", "x", ""),
+        ("gy", "gyro", "y", ""),
+        ("", "", "", ""),
         ("tiempo_ms", "t", "", "ms"),
     ],
 )

@@ -79,7 +79,7 @@ def words_of(name: str) -> list[str]:
     name = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})|(?<=[一-鿿])(?=[A-Za-z])", " ", name)
     parted = []
     words = re.findall(r"[a-z一-鿿]+|\d+", name.lower())
-    for word, after in zip(words, [*words[1:], ""], strict=True):
+    for word, after in zip(words, [*words, ""][1:], strict=True):
         if word in ("velocity", "gravity") or (word == "gy" and after in ("x", "y", "z")):
             parted.append(word)  # the last letter is no axis
         elif match := re.fullmatch(r"([xyz])(gyro\w*|acc\w*|mag\w*)", word):
