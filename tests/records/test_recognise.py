@@ -202,3 +202,11 @@ def test_ten_thousand_rows_take_at_most_a_second(tmp_path):
     begin = time.process_time()
     guess_map(path)
     assert time.process_time() - begin < 1.0
+
+
+def test_names_with_odd_characters_leave_a_map(tmp_path):
+    """A comment of the map holds the name as TOML writes it."""
+    path = written(tmp_path / "log.csv", "time\x01,a\x01x,a\x01y,a\x01z\n", np.column_stack([T, ACC]))
+    tomllib.loads(guess_map(path))
+    path = written(tmp_path / "log.csv", "\x00 [s],acc_x,acc_y,acc_z\n", np.column_stack([T, ACC]))
+    assert "t" in tomllib.loads(guess_map(path))["columns"]

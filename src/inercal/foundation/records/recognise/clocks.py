@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.records.guessed_units import quoted
 from inercal.foundation.records.recognise.words import MEASURED, Said, said
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -50,7 +51,9 @@ def clock(names: Sequence[str], units: Sequence[str | None], values: Array) -> C
         grade = {3: "certain", 2: "likely"}.get(rank, "guess")
         score = rank + 0.5 * timely - 3.0 * float((steps == 0.0).mean()) - 0.01 * index
         how = "with this unit" if words.unit == unit else f"the interval is {step:.6g}"
-        found.append((score, ClockFound(index, unit, grade, f'the header says "{name.strip()}"; {how}')))
+        found.append(
+            (score, ClockFound(index, unit, grade, f"the header says {quoted(name.strip())}; {how}"))
+        )
     return max(found, key=lambda scored: scored[0])[1] if found else None
 
 

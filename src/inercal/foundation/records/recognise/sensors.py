@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.records.guessed_units import quoted
 from inercal.foundation.records.recognise.physics import (
     G0,
     SIZES,
@@ -86,9 +87,9 @@ def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, f
         columns = x[0], y[0], z[0]
         if is_direction(values[:, columns]):
             continue
-        reason = f'the header says "{names[x[0]].strip()}"'
+        reason = f"the header says {quoted(names[x[0]].strip())}"
         if not sensor and len(hints) == 1 and len(full) == 1:
-            sensor, reason = hints[0], f'the file is called "{file}"'
+            sensor, reason = hints[0], f"the file is called {quoted(file)}"
         if sensor != "mag":
             found.append(_Named(sensor, columns, (x[1], y[1], z[1]), reason))
     return found
