@@ -16,6 +16,9 @@ from inercal.foundation.records.guessed_units import EVERYDAY, Guess, median, qu
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.read import format_of
 from inercal.foundation.records.read.table import FirstLook
+from inercal.foundation.records.recognise.clocks import clock
+from inercal.foundation.records.recognise.sensors import sensors
+from inercal.foundation.records.recognise.words import said
 from inercal.foundation.records.titles import (
     OF_A_MODEL,
     bare,
@@ -26,6 +29,7 @@ from inercal.foundation.records.titles import (
     titled,
     triads_by_name,
 )
+from inercal.foundation.units import parse_quantity, parse_unit
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
@@ -66,8 +70,9 @@ def guess_map(
     channel.
     """
     files: list[_File] = []
+    hertz = None if rate is None else parse_quantity(rate, "frequency", "rate").value
     for path in [paths] if isinstance(paths, str | Path) else paths:
-        looked = _look(Path(path), on_table, of_model)
+        looked = _look(Path(path), on_table, of_model, hertz)
         if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files += looked
     if not any(_MEASURED.fullmatch(name) for file in files for name in file.guesses):
@@ -115,14 +120,16 @@ def _samples(path: Path) -> Sequence[FirstLook]:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
 
 
-def _look(path: Path, on_table: bool, of_model: bool) -> list[_File]:
+def _look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> list[_File]:
     """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
     samples = sorted(_samples(path), key=lambda sample: -len(sample.values))
     lengths: dict[int, dict[str, Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
         named = sample.names or on_table or of_model
-        for guess in _by_header(sample, on_table, of_model) if named else _by_shape(sample, path):
+        for guess in (
+            _by_header(sample, on_table, of_model, path.name, rate) if named else _by_shape(sample, path)
+        ):
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
@@ -176,7 +183,9 @@ def _skeleton(files: Sequence[_File], names: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _by_header(sample: FirstLook, on_table: bool, of_model: bool) -> list[Guess]:
+def _by_header(
+    sample: FirstLook, on_table: bool, of_model: bool, file: str, rate: float | None
+) -> list[Guess]:
     """Channels by the names in the header."""
     guesses = []
     for index, title in enumerate(sample.names):
@@ -197,7 +206,50 @@ def _by_header(sample: FirstLook, on_table: bool, of_model: bool) -> list[Guess]
         guesses.append(Guess(name, _origin(sample, index), values, unit, reason))
     if of_model:
         return _counted(guesses)
+    if not on_table:
+        return _recognised(sample, guesses, file, rate)
     return guesses if any(_MEASURED.fullmatch(each.name) for each in guesses) else guesses + _by_norm(sample)
+
+
+def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float | None) -> list[Guess]:
+    """Channels by their names, the accelerometers and gyros among them recognised by all the evidence there is."""
+    if found_t := clock(sample.names, sample.units, sample.values):
+        origin, values = _origin(sample, found_t.column), sample.values[:, found_t.column]
+        what = Guess("t", origin, values, found_t.unit, found_t.reason, found_t.grade)
+        guesses = [what, *(guess for guess in guesses if guess.name != "t" and guess.origin != origin)]
+    by_name = {guess.name: guess for guess in reversed(guesses)}
+    t = None if rate is None else np.arange(len(sample.values)) / rate
+    if stamps := by_name.get("t"):
+        t = stamps.values * parse_unit(units_of({"t": stamps})["t"][0]).factor
+    triads = sensors(sample.names, sample.units, sample.values, t, file)
+    used = {_origin(sample, index) for triad in triads for index in triad.columns}
+    found = {triad.sensor for triad in triads}
+    titles = {_origin(sample, index): name for index, name in enumerate(sample.names)}
+    kept = [
+        guess
+        for guess in guesses
+        if guess.origin not in used
+        and guess.name.partition("_")[0] not in found
+        and not said(titles[guess.origin]).never
+    ]
+    for triad in triads:
+        for axis, index, unit in zip("xyz", triad.columns, triad.units, strict=True):
+            values, origin = sample.values[:, index], _origin(sample, index)
+            what = Guess(
+                f"{triad.sensor}_{axis}", origin, values, unit, triad.reason, triad.grade, triad.question
+            )
+            stated = by_name.get(what.name)
+            if (
+                stated is not None
+                and stated.origin == origin
+                and stated.unit
+                and not fits(what.name, stated.unit)
+            ):
+                what = replace(what, unit=stated.unit, grade="", question="")
+            elif stated is not None and stated.origin == origin and stated.unit:
+                what = replace(what, unit=stated.unit)
+            kept.append(what)
+    return kept
 
 
 def _counted(guesses: list[Guess]) -> list[Guess]:
@@ -234,7 +286,11 @@ def _is_clock(values: Array) -> bool:
 def _origin(sample: FirstLook, index: int) -> Origin:
     """The name of a column in a map."""
     if sample.names:
-        return sample.names[index] if sample.names.count(sample.names[index]) == 1 else index
+        return (
+            sample.names[index]
+            if not sample.numbered and sample.names.count(sample.names[index]) == 1
+            else index
+        )
     return (sample.variable, index) if sample.variable else index
 
 
@@ -294,6 +350,7 @@ def _columns(file: _File, table: str) -> list[str]:
         if name[1:].isdigit() and name[0] == "a":
             comment += f"; say under [sensors.{name}] of the study where it sits and points"
         origin = list(guess.origin) if isinstance(guess.origin, tuple) else guess.origin
+        lines += [f"# QUESTION: {guess.question}"] if guess.question and name.endswith("_x") else []
         lines += ["", f"# {comment}", f"[{table}.{name}]", f"from = {quoted(origin)}"]
         lines += [] if name == "label" else [f"unit = {quoted(unit)}"]
     return lines

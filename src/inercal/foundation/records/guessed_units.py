@@ -20,13 +20,19 @@ _POSITIONS = 1000
 
 @dataclass(frozen=True)
 class Guess:
-    """A channel thought to be in a column: where that is, its values, a unit if it was said, and why."""
+    """A channel thought to be in a column: where that is, its values, a unit if it was said, and why.
+
+    ``grade`` is that of a channel recognised with its unit (certain, likely or guess), empty of others; of a guess
+    there is a ``question``.
+    """
 
     name: str
     origin: Origin
     values: Array
     unit: str | None
     reason: str
+    grade: str = ""
+    question: str = ""
 
 
 def median(values: Array) -> float:
@@ -41,6 +47,9 @@ def units_of(guesses: Mapping[str, Guess]) -> dict[str, tuple[str, str]]:
     acc = (acc_unit, "as x") if acc_unit and fits("acc_x", acc_unit) else _acc_unit(guesses)
     units = {}
     for name, guess in guesses.items():
+        if guess.grade and guess.unit is not None:
+            units[name] = (guess.unit, guess.grade)
+            continue
         if guess.unit is not None and fits(name, guess.unit):
             units[name] = (guess.unit, "with this unit")
             continue

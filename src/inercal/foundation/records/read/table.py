@@ -76,7 +76,8 @@ class FirstLook:
     """A first look at an array of a file, to guess a map from.
 
     ``values`` (n, k) are its columns (text is NaN), ``names`` (k,) its header and ``units`` (k,) those stated
-    beside the names, if any; ``leading`` holds the lines passed over by ``options.skip``.
+    beside the names, if any; ``leading`` holds the lines passed over by ``options.skip``. Columns ``numbered`` are
+    found by their number alone: their names stand in those lines.
     """
 
     values: Array
@@ -85,6 +86,7 @@ class FirstLook:
     variable: str = ""
     leading: tuple[str, ...] = ()
     units: tuple[str | None, ...] = ()
+    numbered: bool = False
 
 
 class Reader(Protocol):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, repeat
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from inercal.foundation.records.checks import too_long
 from inercal.foundation.records.places import counted, counted_names, places, shortened
 from inercal.foundation.records.read.layout import Block, TextLayout, blocks, find_layout, is_rounded
 from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
+from inercal.foundation.records.recognise.lines import heading
 from inercal.foundation.records.titles import EXAMPLE, bare, canonical
 from inercal.foundation.units import shown
 
@@ -107,12 +108,36 @@ def peek(path: Path) -> list[FirstLook]:
     """Look at the first 2 MB of a text file; lines before the header are found out."""
     with path.open("rb") as file:
         head = next(blocks(file, path))
-    skip = _leading(head.lines, path)
+    above = heading(head.lines)
+    try:
+        look = _look(head, _leading(head.lines, path), path)
+    except RecordError:
+        if above is None:
+            raise
+        look = None
+    if above is None or (look is not None and look.names and not _has_odd_row(look)):
+        return [look] if look is not None else []
+    other = _look(head, above.first, path)
+    if other.names or other.values.shape[1] < len(above.names):
+        return [look or other]
+    more = other.values.shape[1] - len(above.names)
+    names, units = (*above.names, *[""] * more), (*above.units, *[None] * more) if above.units else ()
+    return [replace(other, names=names, units=units, numbered=True)]
+
+
+def _look(head: Block, skip: int, path: Path) -> FirstLook:
+    """The rows behind so many lines, with the names in the header, if any."""
     layout = find_layout(head.lines, FileOptions(skip=skip), path)
     layout = layout.settled(head.lines[layout.first :])
     rows, _ = _line_by_line(head.after(layout.first), layout, tuple(range(layout.width)))
     names = (*layout.header, *repeat("", layout.width))[: layout.width] if layout.header else ()
-    return [FirstLook(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))]
+    return FirstLook(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))
+
+
+def _has_odd_row(look: FirstLook) -> bool:
+    """True where the first row lacks numbers that nearly all others have, as a row of units does."""
+    missing = np.isnan(look.values)
+    return bool((missing[0] & (missing.mean(axis=0) < 0.1)).any()) if len(missing) else False
 
 
 def _leading(lines: list[str], path: Path) -> int:
