@@ -25,7 +25,7 @@ class Limits:
     """Limits by which a fit is judged; ``LIMITS`` are the ones in force."""
 
     question_risk: float = 5e-3
-    """Probability that any question names something in a sound fit: with the catalogue, order and values one percent."""
+    """Probability that any question names something in a sound fit: with all else that is asked one percent."""
 
     order_risk: float = 1e-3
     """Probability that another order of the rows is named in a sound fit."""
@@ -48,8 +48,8 @@ class Limits:
     fewest_degrees: int = 3
     """Degrees of freedom from which a fit is asked."""
 
-    rounding: float = 1e-11
-    """Residuals, over readings, up to which they are rounding of numbers and no noise: simulations without any."""
+    rounding: float = 1e-8
+    """Residuals, over readings, up to which a record is a simulation without noise: no table is as exact."""
 
     tied: float = 2.8
     """Difference of predictions, in standard deviations of a reading, beyond which equal readings at an end are not one
@@ -247,19 +247,28 @@ def _moved(
     return words, change, at[lost, taken]
 
 
+def _rms(fit: Fitted, own: NDArray[np.int64]) -> float:
+    """Rms residual of some readings."""
+    return float(np.sqrt(np.mean(np.square(fit.residuals[own]))))
+
+
 def _sigma(fit: Fitted, own: NDArray[np.int64]) -> float:
     """Standard deviation of a reading of some, their median."""
     return float(np.median(np.sqrt(np.diag(fit.covariance)[own])))
 
 
-def grid(y: Array) -> float:
-    """The step of which all differences of readings ``y`` (n,) are multiples; 0 where there is none."""
+def _grid(y: Array, rms: float) -> float:
+    """The step of which all differences of readings ``y`` (n,) are multiples; 0 where there is none.
+
+    A plan of regular inputs makes multiples too, but only as exact as its scatter ``rms``.
+    """
     steps = np.diff(np.unique(y))
     steps = steps[steps > 1e-9 * np.ptp(y)]
     if len(steps) < 3:
         return 0.0
     step = float(steps.min())
-    return step if float(np.abs(steps / step - np.round(steps / step)).max()) < 1e-3 else 0.0
+    left = float(np.abs(steps - step * np.round(steps / step)).max())
+    return step if left < 1e-3 * min(step, rms) else 0.0
 
 
 def _ends(fit: Fitted) -> Iterator[Finding]:
@@ -267,7 +276,7 @@ def _ends(fit: Fitted) -> Iterator[Finding]:
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
         y, model = fit.readings[own], fit.predicted[own]
-        if grid(y) > 0.0 or not np.ptp(y):
+        if _grid(y, _rms(fit, own)) > 0.0 or not np.ptp(y):
             continue
         for word, end in (("upper", y.max()), ("lower", y.min())):
             tied = np.abs(y - end) <= 1e-12 * np.ptp(y)
@@ -287,8 +296,8 @@ def _steps(fit: Fitted) -> Iterator[Finding]:
     """Channels whose steps are larger than the scatter of their readings, and hence no noise."""
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
-        step = grid(fit.readings[own])
-        rms = float(np.sqrt(np.mean(np.square(fit.residuals[own]))))
+        rms = _rms(fit, own)
+        step = _grid(fit.readings[own], rms)
         if step <= rms:
             continue
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -196,6 +196,7 @@ def _by_reading(fit: Fitted) -> Iterator[Question]:
         size, used = np.abs(y), own > 0.0
         top, middle = max(float(size.max()), 1e-300), float(np.median(size[used]))
         low, high = np.quantile(y[used], [0.15, 0.85])
+        ends = y[used].min() + np.ptp(y[used]) * np.array([0.05, 0.95])
         shapes = {
             ("differ", "between its two signs"): size[:, None],
             ("step", "where it changes its sign"): (np.sign(y) * own)[:, None],
@@ -206,6 +207,8 @@ def _by_reading(fit: Fitted) -> Iterator[Question]:
             ),
             ("bend", "at its upper end"): (np.maximum(y - high, 0.0) * own)[:, None],
             ("bend", "at its lower end"): (np.minimum(y - low, 0.0) * own)[:, None],
+            ("bend", "close to its upper end"): (np.maximum(y - ends[1], 0.0) * own)[:, None],
+            ("bend", "close to its lower end"): (np.minimum(y - ends[0], 0.0) * own)[:, None],
         }
         for words, shape in shapes.items():
             by_channel.setdefault(words, []).append(shape)
