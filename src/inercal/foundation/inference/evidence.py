@@ -23,7 +23,7 @@ _RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class AskedError:
     """One error beside a fit of n residuals, of which m combinations show.
 
     ``basis`` (n, m) orthonormal; ``size`` (k, m) parameters of the error that make each; ``reach`` (p, m) shift of the
@@ -41,7 +41,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class FitEvidence:
     """Residuals of a fit, white, and all that it takes to ask them.
 
     Attributes
@@ -76,24 +76,24 @@ class Evidence:
         return float(self.z @ self.z)
 
     def beside(self, columns: Array) -> Array:
-        """What the fit leaves of ``columns`` (n, k) or (n,), whitened."""
+        """Columns (n, k) or (n,) less all that the fit takes up, whitened."""
         white = self.inverse @ columns
         return np.asarray(white - self.fitted @ (self.fitted.T @ white))
 
-    def ask(self, columns: Array) -> Asked:
+    def ask(self, columns: Array) -> AskedError:
         """The combinations of an error's ``columns`` (n, k) that show."""
         length = np.linalg.norm(self.inverse @ columns, axis=0)
         length = np.where(length > 0.0, length, 1.0)
         basis, s, vt = np.linalg.svd(self.beside(columns / length), full_matrices=False)
         shown = s > SEEN
         size = vt[shown].T / s[shown] / length[:, None]
-        return Asked(basis[:, shown], size, self.gain @ columns @ size)
+        return AskedError(basis[:, shown], size, self.gain @ columns @ size)
 
-    def explained(self, asked: Asked) -> float:
+    def explained(self, asked: AskedError) -> float:
         """Sum of squares that the error takes away."""
         return float(np.sum(np.square(asked.basis.T @ self.z)))
 
-    def chance(self, asked: Asked, by_residuals: bool = False) -> float:
+    def chance(self, asked: AskedError, by_residuals: bool = False) -> float:
         """Probability that a sound fit explains as much by this error; ``by_residuals``: as if these alone told the
         noise, which ranks errors where all doubt has gone."""
         from scipy.special import chdtrc, fdtrc
@@ -106,17 +106,21 @@ class Evidence:
         free = max(self.dof - m, 1) + nu
         return float(fdtrc(m, free, S / m * free / left)) if left > 0.0 else 1.0
 
-    def shift(self, asked: Asked) -> Array:
+    def shift(self, asked: AskedError) -> Array:
         """Shift (p,) of the values by the error of the size that the residuals show."""
         return np.asarray(asked.reach @ (asked.basis.T @ self.z))
 
-    def without(self, asked: Asked) -> Evidence:
+    def without(self, asked: AskedError) -> FitEvidence:
         """The evidence with this error fitted as well."""
         left = self.z - asked.basis @ (asked.basis.T @ self.z)
-        return Evidence(left, self.inverse, np.hstack([self.fitted, asked.basis]), self.gain, self.noise_dof)
+        return FitEvidence(
+            left, self.inverse, np.hstack([self.fitted, asked.basis]), self.gain, self.noise_dof
+        )
 
 
-def evidence(residuals: Array, covariance: Array, fitted: Array, gain: Array, noise_dof: float) -> Evidence:
+def evidence(
+    residuals: Array, covariance: Array, fitted: Array, gain: Array, noise_dof: float
+) -> FitEvidence:
     """The evidence of a fit.
 
     Parameters
@@ -129,7 +133,7 @@ def evidence(residuals: Array, covariance: Array, fitted: Array, gain: Array, no
     gain : (p, n)
         Change of the values by each reading.
     noise_dof : float
-        As in `Evidence`.
+        As in `FitEvidence`.
 
     Raises
     ------
@@ -142,4 +146,4 @@ def evidence(residuals: Array, covariance: Array, fitted: Array, gain: Array, no
     basis, s, _ = np.linalg.svd(white / np.where(length > 0.0, length, 1.0), full_matrices=False)
     basis = basis[:, s > _RANK * s.max(initial=0.0)]
     z = inverse @ residuals
-    return Evidence(z - basis @ (basis.T @ z), inverse, basis, gain, noise_dof)
+    return FitEvidence(z - basis @ (basis.T @ z), inverse, basis, gain, noise_dof)

@@ -9,58 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import EVERYTHING, Finding
-from inercal.foundation.inference.evidence import Asked, Evidence, evidence
-from inercal.foundation.inference.questions import Fitted, Question, questions
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits by which a fit is judged; ``LIMITS`` are the ones in force."""
-
-    question_risk: float = 5e-3
-    """Probability that any question names something in a sound fit: with all else that is asked one percent."""
-
-    order_risk: float = 1e-3
-    """Probability that another order of the rows is named in a sound fit."""
-
-    harm: float = 2.0
-    """Shift of a value, in u, beyond which an error does harm."""
-
-    as_likely: float = 0.8
-    """Logarithm of a chance, over that of the likeliest question, with which another counts as likely."""
-
-    compared: int = 8
-    """Likeliest questions of which that one speaks beside which least is left."""
-
-    gross: float = 3.0
-    """Residuals, over what stated noise and errors explain, from which nothing can be used."""
-
-    most_readings: int = 1000
-    """Readings up to which a fit is asked: the covariance is that of every pair."""
-
-    fewest_degrees: int = 3
-    """Degrees of freedom from which a fit is asked."""
-
-    rounding: float = 1e-8
-    """Residuals, over readings, up to which a record is a simulation without noise: no table is as exact."""
-
-    tied: float = 2.8
-    """Difference of predictions, in standard deviations of a reading, beyond which equal readings at an end are not one
-    reading."""
-
-    most_steps: int = 60
-    """Rows at most from which the order of all later ones is tried."""
-
-
-LIMITS = Limits()
-"""The limits in force."""
+from inercal.foundation.inference.evidence import AskedError, FitEvidence, evidence
+from inercal.foundation.inference.limits import LIMITS
+from inercal.foundation.inference.questions import JudgedFit, Question, questions
 
 _CODES = {"order": "by_order", "place": "by_place", "reading": "by_reading", "history": "by_history"}
 
@@ -72,13 +29,13 @@ _LOOK = {
 }
 
 
-def evidence_of(fit: Fitted) -> Evidence:
+def evidence_of(fit: JudgedFit) -> FitEvidence:
     """The evidence of a fit; raises LinAlgError where its covariance is not positive definite."""
     columns = np.hstack([fit.by_value, fit.beside])
     return evidence(fit.residuals, fit.covariance, columns, fit.gain, fit.noise_dof)
 
 
-def judge(fit: Fitted, share: float = 1.0) -> tuple[Finding, ...]:
+def judge(fit: JudgedFit, share: float = 1.0) -> tuple[Finding, ...]:
     """Findings about a fit: order of the rows, ends and steps of the outputs, and what the questions show; ``share`` of
     the risk, where a result has several fits."""
     if len(fit.residuals) > LIMITS.most_readings:
@@ -96,7 +53,7 @@ def judge(fit: Fitted, share: float = 1.0) -> tuple[Finding, ...]:
     return (*_ends(fit), *_steps(fit), *_answers(fit, of_fit, share * LIMITS.question_risk))
 
 
-def _answers(fit: Fitted, of_fit: Evidence, risk: float) -> Iterator[Finding]:
+def _answers(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Finding]:
     """The question that speaks, if any does."""
     pairs = _asked(of_fit, questions(fit))
     if not pairs:
@@ -124,12 +81,12 @@ def _answers(fit: Fitted, of_fit: Evidence, risk: float) -> Iterator[Finding]:
     )
 
 
-def _enough(of_fit: Evidence, asked: Asked) -> bool:
+def _enough(of_fit: FitEvidence, asked: AskedError) -> bool:
     """True if a question shows, and leaves as many degrees of freedom as it takes."""
     return 0 < asked.count <= max(1, (of_fit.dof - 2) // 2)
 
 
-def _asked(of_fit: Evidence, table: Sequence[Question]) -> list[tuple[Question, Asked]]:
+def _asked(of_fit: FitEvidence, table: Sequence[Question]) -> list[tuple[Question, AskedError]]:
     """Questions that show, those of one span once."""
     made, seen = [], set()
     probe = np.sin(1.0 + np.arange(len(of_fit.z)))
@@ -145,9 +102,9 @@ def _asked(of_fit: Evidence, table: Sequence[Question]) -> list[tuple[Question, 
 
 
 def _finding(
-    fit: Fitted,
-    of_fit: Evidence,
-    pairs: Sequence[tuple[Question, Asked]],
+    fit: JudgedFit,
+    of_fit: FitEvidence,
+    pairs: Sequence[tuple[Question, AskedError]],
     chances: Array,
     first: int,
     others: Sequence[int],
@@ -176,7 +133,7 @@ def _item(kind: str, question: Question, chance: float) -> dict[str, str | float
     return {"kind": kind, "by": question.cell, "what": question.sentence, "by chance": float(chance)}
 
 
-def _order(fit: Fitted, of_fit: Evidence, risk: float) -> Iterator[Finding]:
+def _order(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Finding]:
     """Rows late or early by one: all, one channel's, or all from a row on.
 
     Two models without parameters, compared without the row that has no reading in the other order: their likelihood
@@ -232,7 +189,7 @@ def _order(fit: Fitted, of_fit: Evidence, risk: float) -> Iterator[Finding]:
 
 
 def _moved(
-    fit: Fitted, at: NDArray[np.int64], words: str, start: int, by: int, only: int | None
+    fit: JudgedFit, at: NDArray[np.int64], words: str, start: int, by: int, only: int | None
 ) -> tuple[str, Array, NDArray[np.int64]]:
     """Another order in words, the change (n,) of the readings, and the readings that have none in it."""
     rows = len(at)
@@ -247,12 +204,12 @@ def _moved(
     return words, change, at[lost, taken]
 
 
-def _rms(fit: Fitted, own: NDArray[np.int64]) -> float:
+def _rms(fit: JudgedFit, own: NDArray[np.int64]) -> float:
     """Rms residual of some readings."""
     return float(np.sqrt(np.mean(np.square(fit.residuals[own]))))
 
 
-def _sigma(fit: Fitted, own: NDArray[np.int64]) -> float:
+def _sigma(fit: JudgedFit, own: NDArray[np.int64]) -> float:
     """Standard deviation of a reading of some, their median."""
     return float(np.median(np.sqrt(np.diag(fit.covariance)[own])))
 
@@ -271,7 +228,7 @@ def _grid(y: Array, rms: float) -> float:
     return step if left < 1e-3 * min(step, rms) else 0.0
 
 
-def _ends(fit: Fitted) -> Iterator[Finding]:
+def _ends(fit: JudgedFit) -> Iterator[Finding]:
     """Channels with equal readings at an end where the model differs."""
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
@@ -292,7 +249,7 @@ def _ends(fit: Fitted) -> Iterator[Finding]:
                 )
 
 
-def _steps(fit: Fitted) -> Iterator[Finding]:
+def _steps(fit: JudgedFit) -> Iterator[Finding]:
     """Channels whose steps are larger than the scatter of their readings, and hence no noise."""
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
@@ -313,7 +270,7 @@ def _steps(fit: Fitted) -> Iterator[Finding]:
             )
 
 
-def gross(fit: Fitted) -> float:
+def gross(fit: JudgedFit) -> float:
     """Residuals over what stated noise and errors explain, where they make the fit useless; 0 where they do not."""
     if not math.isinf(fit.noise_dof) or len(fit.residuals) > LIMITS.most_readings:
         return 0.0

@@ -1,4 +1,4 @@
-"""What may be wrong with a calibration, without a list of faults: every pair of what errs and by what it errs.
+"""Questions about a calibration, without a list of faults: every pair of what errs and by what it errs.
 
 A calibration takes its values as constant, its inputs as stated, and its outputs as undistorted. Each may err by
 order (time), by place (the coordinate of an input), by the reading itself, and by history (what came before). Columns
@@ -18,7 +18,7 @@ from inercal.foundation.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Stated:
+class StatedInput:
     """An input that the model takes as stated: ``value`` (n,) at each reading, ``slope`` (n,) of the readings by a
     small error of it, ``period`` of its coordinate, or 0."""
 
@@ -29,7 +29,7 @@ class Stated:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class JudgedFit:
     """A least-squares fit of n readings as its judge sees it.
 
     Attributes
@@ -44,7 +44,7 @@ class Fitted:
     time : (n,)
     channels : names of the channels
     inputs : inputs that the model takes as stated
-    noise_dof : as in `inercal.foundation.inference.evidence.Evidence`
+    noise_dof : as in `inercal.foundation.inference.evidence.FitEvidence`
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ class Fitted:
     channel: NDArray[np.int64]
     time: Array
     channels: tuple[str, ...]
-    inputs: tuple[Stated, ...]
+    inputs: tuple[StatedInput, ...]
     noise_dof: float
 
     @property
@@ -95,7 +95,7 @@ class Question:
 
 @dataclass(frozen=True, eq=False)
 class _Subject:
-    """What may err: columns (n, q) by a small error of each of its parts."""
+    """One thing that may err: columns (n, q) by a small error of each of its parts."""
 
     what: str
     plural: bool
@@ -109,7 +109,7 @@ _LAG = 0.35
 """Share of the way by which a lagging output follows its load from row to row."""
 
 
-def questions(fit: Fitted) -> list[Question]:
+def questions(fit: JudgedFit) -> list[Question]:
     """All questions about a fit, some 45 to 120."""
     return [*_by_order(fit), *_by_place(fit), *_by_reading(fit), *_by_history(fit)]
 
@@ -119,7 +119,7 @@ def _times(columns: Array, shape: Array) -> Array:
     return np.asarray((columns[:, :, None] * shape[:, None, :]).reshape(len(columns), -1))
 
 
-def _subjects(fit: Fitted) -> list[_Subject]:
+def _subjects(fit: JudgedFit) -> list[_Subject]:
     """Biases, gains, values by family, inputs."""
     several = len(fit.channels) > 1
     one = fit.per_channel
@@ -140,7 +140,7 @@ def _subjects(fit: Fitted) -> list[_Subject]:
     return made + [_Subject(f"the input {given.name}", False, given.slope[:, None]) for given in fit.inputs]
 
 
-def _by_order(fit: Fitted) -> Iterator[Question]:
+def _by_order(fit: JudgedFit) -> Iterator[Question]:
     """Drift, bend, sway, settling and steps over time."""
     s = (fit.time - fit.time.min()) / max(float(np.ptp(fit.time)), 1e-300)
     shapes = [
@@ -157,7 +157,7 @@ def _by_order(fit: Fitted) -> Iterator[Question]:
     yield Question("order", "the values", True, "differ", "between the halves", fit.by_value * late)
 
 
-def _by_place(fit: Fitted) -> Iterator[Question]:
+def _by_place(fit: JudgedFit) -> Iterator[Question]:
     """Harmonics or curves over the coordinate of each input, of the input and of the biases."""
     bias, *_ = _subjects(fit)
     for given in fit.inputs:
@@ -168,7 +168,7 @@ def _by_place(fit: Fitted) -> Iterator[Question]:
             yield Question("place", bias.what, bias.plural, "change", over, _times(bias.columns, shape))
 
 
-def _places(given: Stated) -> list[tuple[str, Array]]:
+def _places(given: StatedInput) -> list[tuple[str, Array]]:
     """Functions of an input's coordinate, in words."""
     if given.period:
         x = 2.0 * math.pi * given.value / given.period
@@ -188,7 +188,7 @@ def _places(given: Stated) -> list[tuple[str, Array]]:
     ]
 
 
-def _by_reading(fit: Fitted) -> Iterator[Question]:
+def _by_reading(fit: JudgedFit) -> Iterator[Question]:
     """Distortions of the output by itself, of each channel and of all alike."""
     by_channel: dict[tuple[str, str], list[Array]] = {}
     for own in fit.per_channel.T:
@@ -222,7 +222,7 @@ def _by_reading(fit: Fitted) -> Iterator[Question]:
             yield Question("reading", "the output", False, verb, rest, shapes_of[0])
 
 
-def neighbours(fit: Fitted, x: Array, by: int) -> Array:
+def neighbours(fit: JudgedFit, x: Array, by: int) -> Array:
     """``x`` (n,) of the row before (``by`` = -1) or behind (1) in the same channel; its own at the end."""
     made = x.copy()
     for own in fit.per_channel.T:
@@ -233,8 +233,8 @@ def neighbours(fit: Fitted, x: Array, by: int) -> Array:
     return made
 
 
-def _lagging(fit: Fitted, x: Array) -> Array:
-    """What follows ``x`` (n,) from row to row."""
+def _lagging(fit: JudgedFit, x: Array) -> Array:
+    """A state that follows ``x`` (n,) from row to row."""
     made = np.zeros_like(x)
     for own in fit.per_channel.T:
         index = np.flatnonzero(own)
@@ -245,8 +245,8 @@ def _lagging(fit: Fitted, x: Array) -> Array:
     return made
 
 
-def _by_history(fit: Fitted) -> Iterator[Question]:
-    """What came before, of outputs and of inputs."""
+def _by_history(fit: JudgedFit) -> Iterator[Question]:
+    """Memory of outputs and of inputs."""
     one, y = fit.per_channel, fit.predicted
     several = len(fit.channels) > 1
     what = "the outputs" if several else "the output"

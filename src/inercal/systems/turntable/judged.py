@@ -1,4 +1,4 @@
-"""What values of an instrument on a table can be, and what another order of the rows says of a result."""
+"""Values that an instrument on a table cannot have, and the verdict on another order of the rows."""
 
 from __future__ import annotations
 

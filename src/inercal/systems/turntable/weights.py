@@ -29,9 +29,6 @@ from inercal.systems.turntable.model import TableModel
 _TINY = 1e-100
 """Least information about the logarithm of a variance."""
 
-_FEWEST = 1e-3
-"""Degrees of freedom of a noise below which it is nothing that the readings know of."""
-
 
 @dataclass(frozen=True)
 class ReadingNoise:
@@ -74,8 +71,8 @@ def scatter(
     # of a variance that is estimated as none the readings know next to nothing
     size = np.sqrt(np.maximum(np.diag(of_log), _TINY))
     known = 2.0 * np.square(size) / np.diag(np.linalg.pinv(of_log / np.outer(size, size)))
-    # a noise of 0 beside the table: rounding alone makes its degrees of freedom nearly 0, negative or infinite
-    dof[free] = np.where((known > _FEWEST) & np.isfinite(known), known, 1.0)
+    # a noise of 0 beside the table: rounding alone makes its degrees of freedom negative or infinite
+    dof[free] = np.where(np.isfinite(known) & (known > 0.0), known, 1.0)
     return ReadingNoise(np.sqrt(variance), dof, found.score.value)
 
 

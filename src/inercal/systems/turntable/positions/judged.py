@@ -9,7 +9,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.judge import judge
-from inercal.foundation.inference.questions import Fitted, Stated
+from inercal.foundation.inference.questions import JudgedFit, StatedInput
 from inercal.systems.turntable.positions.examination import Examination
 from inercal.systems.turntable.positions.shifts import Scale
 from inercal.systems.turntable.readings import Readings
@@ -27,8 +27,10 @@ def judged_positions(
     examination: Examination,
     noise_stated: bool,
 ) -> tuple[Finding, ...]:
-    """What the readings show beside the terms and the faults that were named; ``values`` (p,) of the names in
-    ``scale``."""
+    """Findings about all that the readings show beside the terms and the faults that were named.
+
+    ``values`` (p,) are those of the names in ``scale``.
+    """
     n, c = fit.y.shape
     weight = fit.weights(fit.noise)
     common = weight.common.reshape(n * c, -1)
@@ -37,7 +39,7 @@ def judged_positions(
         covariance[k * c : (k + 1) * c, k * c : (k + 1) * c] += block
     named = [fault.fault.columns.reshape(n * c, -1) for fault in examination.significant]
     return judge(
-        Fitted(
+        JudgedFit(
             scale.names,
             values,
             scale.u,
@@ -57,7 +59,7 @@ def judged_positions(
     )
 
 
-def _joints(fit: Regression) -> tuple[Stated, ...]:
+def _joints(fit: Regression) -> tuple[StatedInput, ...]:
     """The joints that move, as inputs."""
     c = fit.y.shape[1]
     made = []
@@ -67,5 +69,5 @@ def _joints(fit: Regression) -> tuple[Stated, ...]:
         step = _STEP * np.eye(fit.angles.shape[1])[k]
         ends = [fit.model.outputs(fit.angles + sign * step, fit.c) for sign in (1.0, -1.0)]
         slope = (ends[0] - ends[1]) / (2.0 * _STEP)
-        made.append(Stated(name, np.repeat(fit.angles[:, k], c), slope.reshape(-1), 2.0 * math.pi))
+        made.append(StatedInput(name, np.repeat(fit.angles[:, k], c), slope.reshape(-1), 2.0 * math.pi))
     return tuple(made)

@@ -95,7 +95,9 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
         if np.isinf(dof):
             components.append(TypeB(name, sigma, unit, gain[..., k], redrawn=True))
         else:
-            components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
+            components.append(
+                TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, max(dof, 1.0))
+            )
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(

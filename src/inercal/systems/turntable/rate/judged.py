@@ -10,7 +10,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.judge import gross, judge
-from inercal.foundation.inference.questions import Fitted, Stated
+from inercal.foundation.inference.questions import JudgedFit, StatedInput
 from inercal.systems.turntable.rate.fit import GyroRateFit, approaches, columns, symbols, weights_of
 from inercal.systems.turntable.rate.stays import Input, RateDwells
 
@@ -18,8 +18,11 @@ from inercal.systems.turntable.rate.stays import Input, RateDwells
 def judged_rates(
     dwells: RateDwells, inputs: Sequence[Input], fits: Sequence[GyroRateFit], u: Array
 ) -> tuple[tuple[Finding, ...], str]:
-    """What the stays show beside the terms of each gyro, and a sentence where they cannot be used at all; ``u`` (p,) of
-    the values of all fits. Gyros that several axes turn are not asked yet: each attitude has a bias of its own."""
+    """Findings about all that the stays show beside the terms of each gyro, and a sentence where nothing can be used.
+
+    ``u`` (p,) are those of the values of all fits. Gyros that several axes turn are not asked yet: each attitude has a
+    bias of its own.
+    """
     ends = np.cumsum([len(fit.names) for fit in fits])[:-1]
     findings: list[Finding] = []
     excess = ""
@@ -37,7 +40,7 @@ def judged_rates(
     return tuple(findings), excess
 
 
-def _fitted(dwells: RateDwells, given: Input, fit: GyroRateFit, u: Array) -> Fitted:
+def _fitted(dwells: RateDwells, given: Input, fit: GyroRateFit, u: Array) -> JudgedFit:
     """One gyro's fit."""
     n = len(dwells.rate)
     weight = weights_of(given.effects, fit.scale, n)
@@ -45,7 +48,7 @@ def _fitted(dwells: RateDwells, given: Input, fit: GyroRateFit, u: Array) -> Fit
     covariance = common @ common.T + np.diag(weight.within[:, 0, 0] + fit.noise**2)
     cubic = dict(zip(symbols(fit.axis, 3, True), columns(given.x, 3, True).T, strict=True))
     none = np.zeros(n)
-    return Fitted(
+    return JudgedFit(
         fit.names,
         fit.values,
         u,
@@ -59,6 +62,6 @@ def _fitted(dwells: RateDwells, given: Input, fit: GyroRateFit, u: Array) -> Fit
         np.zeros(n, dtype=np.int64),
         np.arange(n, dtype=float),
         (f"gyro_{fit.axis}",),
-        (Stated("rate", given.x, np.full(n, fit.scale)),),
+        (StatedInput("rate", given.x, np.full(n, fit.scale)),),
         math.inf if math.isinf(fit.noise_dof) else 0.0,
     )
