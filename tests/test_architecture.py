@@ -199,7 +199,7 @@ WITHIN = {
     ),
     "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
     "turntable": (
-        "limits settings disturbances model weights second_order regression readings display sensitivity "
+        "limits settings judged disturbances model weights second_order regression readings display sensitivity "
         "positions rate steps task figures verbs system"
     ),
     "aoa": (

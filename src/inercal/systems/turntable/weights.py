@@ -70,7 +70,9 @@ def scatter(
     of_log = found.score.information * np.outer(s2, s2)
     # of a variance that is estimated as none the readings know next to nothing
     size = np.sqrt(np.maximum(np.diag(of_log), _TINY))
-    dof[free] = 2.0 * np.square(size) / np.diag(np.linalg.pinv(of_log / np.outer(size, size)))
+    known = 2.0 * np.square(size) / np.diag(np.linalg.pinv(of_log / np.outer(size, size)))
+    # a noise of 0 beside the table: rounding alone makes its degrees of freedom negative or infinite
+    dof[free] = np.where(np.isfinite(known) & (known > 0.0), known, 1.0)
     return ReadingNoise(np.sqrt(variance), dof, found.score.value)
 
 

@@ -21,11 +21,13 @@ from inercal.foundation.results.budget import TypeA, TypeB, combine
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.chain import Scope
+from inercal.systems.turntable.judged import implausible, misordered
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import FRAME, orthonormal
 from inercal.systems.turntable.positions.application import in_use
 from inercal.systems.turntable.positions.examination import examine
 from inercal.systems.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
+from inercal.systems.turntable.positions.judged import judged_positions
 from inercal.systems.turntable.positions.shifts import Scale, doubts, findings_of, of_latitude, stated_exact
 from inercal.systems.turntable.positions.tolerance import (
     alternatives,
@@ -93,7 +95,9 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
         if np.isinf(dof):
             components.append(TypeB(name, sigma, unit, gain[..., k], redrawn=True))
         else:
-            components.append(TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, dof))
+            components.append(
+                TypeA(name, sigma, unit, sigma**2 * gain[..., k] @ gain[..., k].T, max(dof, 1.0))
+            )
     for error, shift in zip(fit.model.chain.errors, shifts(fit), strict=True):
         std = error.distribution.std
         components.append(
@@ -164,15 +168,20 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         findings += stated_exact(fit, settings.site, scale)
         findings += findings_of(examination, fit, scale, readings.unit)
         uncertainty = combine(names, [*stated, *doubts(examination, fit, scale)])
+        noise_stated = bool(np.isinf(fit.noise_dof).all())
+        findings += judged_positions(readings, fit, scale, terms.values, examination, noise_stated)
+    wrong_order, units = misordered(findings), [unit_of_term(name, unit) for name in names]
+    if not wrong_order:
+        findings += implausible(names, units, terms.values, uncertainty.u, settings)
     of_site = [each.source for each in fit.model.references]
     findings += ruled_by_site(names, uncertainty.budget, of_site, LIMITS.site_ratio)
     return Estimate.of(
         basis,
         names,
-        [unit_of_term(name, unit) for name in names],
+        units,
         terms.values,
         uncertainty,
-        _verdict(readings, fitting),
+        wrong_order or _verdict(readings, fitting),
         findings=findings,
         statistics=_statistics(readings, fitting, result["plan"]["condition"]),
         result=result

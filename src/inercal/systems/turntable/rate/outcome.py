@@ -15,10 +15,12 @@ from inercal.foundation.results.basis import Basis, Formula, conditions_of, stud
 from inercal.foundation.results.budget import TypeA, TypeB, Uncertainty, combine
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate, coverage_factor
+from inercal.systems.turntable.judged import implausible, misordered
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import FRAME
 from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term
 from inercal.systems.turntable.rate.fit import GyroRateFit, approaches
+from inercal.systems.turntable.rate.judged import judged_rates
 from inercal.systems.turntable.rate.stays import Input, RateDwells
 from inercal.systems.turntable.settings import TurntableSettings
 
@@ -60,6 +62,12 @@ def assemble(
         if abs(values[k]) < LIMITS.scale_sigmas * u[k]:
             status = Status.INCONSISTENT
             message = f"the output of gyro_{fit.axis} does not follow the rate: check channel, axis and units"
+    judged, excess = judged_rates(dwells, inputs, fits, u)
+    wrong_order = misordered(judged)
+    units = [unit_of_term(name, unit) for name in names]
+    findings = [*findings, *judged, *([] if wrong_order else implausible(names, units, values, u, settings))]
+    if status is Status.OK and (wrong_order or excess):
+        status, message = wrong_order or (Status.INCONSISTENT, excess)
     if status is Status.OK and identified.condition > WORST_BY_LENGTH:
         status = Status.ILL_CONDITIONED
         weak = f"{identified.weakest()} only weakly (condition number {identified.condition:.0f})"
@@ -67,7 +75,7 @@ def assemble(
     return Estimate.of(
         _basis(record, dwells, settings),
         names,
-        [unit_of_term(name, unit) for name in names],
+        units,
         values,
         uncertainty,
         (status, message),

@@ -1,0 +1,149 @@
+"""Evidence of a fit on errors outside its model: is one seen, and what does it do to the values?
+
+A fit leaves residuals r of covariance ``V = L L^T``; A are its whitened columns. An error with columns X would change
+r by ``X b``. What a fit cannot take up of X is ``(1 - A A^+) L^-1 X``; Q is its orthonormal basis, and
+``S = |Q^T z|^2`` with ``z = (1 - A A^+) L^-1 r`` is the score test: chi-square where V is known, F where residuals
+tell its scale (Breusch and Pagan, Review of Economic Studies 47 (1980) 239).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from inercal.foundation.arrays import Array
+
+SEEN = 0.02
+"""Length of a unit column outside the fit from which it shows."""
+
+_RANK = 1e-10
+"""Singular value of the fitted columns, over the largest, below which they are one column less."""
+
+
+@dataclass(frozen=True, eq=False)
+class AskedError:
+    """One error beside a fit of n residuals, of which m combinations show.
+
+    ``basis`` (n, m) orthonormal; ``size`` (k, m) parameters of the error that make each; ``reach`` (p, m) shift of the
+    p values by each.
+    """
+
+    basis: Array
+    size: Array
+    reach: Array
+
+    @property
+    def count(self) -> int:
+        """Combinations that show."""
+        return int(self.basis.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class FitEvidence:
+    """Residuals of a fit, white, and all that it takes to ask them.
+
+    Attributes
+    ----------
+    z : (n,)
+        White residuals, orthogonal to the fitted columns.
+    inverse : (n, n)
+        Of the root of the covariance, by which residuals are whitened.
+    fitted : (n, r)
+        Orthonormal basis of the fitted columns, whitened.
+    gain : (p, n)
+        Change of the values by each residual.
+    noise_dof : float
+        Degrees of freedom of the noise in the covariance beside the residuals: inf where the noise is stated, 0 where
+        the residuals alone tell it.
+    """
+
+    z: Array
+    inverse: Array
+    fitted: Array
+    gain: Array
+    noise_dof: float
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the residuals."""
+        return int(self.fitted.shape[0] - self.fitted.shape[1])
+
+    @property
+    def squares(self) -> float:
+        """Sum of squares of the white residuals."""
+        return float(self.z @ self.z)
+
+    def beside(self, columns: Array) -> Array:
+        """Columns (n, k) or (n,) less all that the fit takes up, whitened."""
+        white = self.inverse @ columns
+        return np.asarray(white - self.fitted @ (self.fitted.T @ white))
+
+    def ask(self, columns: Array) -> AskedError:
+        """The combinations of an error's ``columns`` (n, k) that show."""
+        length = np.linalg.norm(self.inverse @ columns, axis=0)
+        length = np.where(length > 0.0, length, 1.0)
+        basis, s, vt = np.linalg.svd(self.beside(columns / length), full_matrices=False)
+        shown = s > SEEN
+        size = vt[shown].T / s[shown] / length[:, None]
+        return AskedError(basis[:, shown], size, self.gain @ columns @ size)
+
+    def explained(self, asked: AskedError) -> float:
+        """Sum of squares that the error takes away."""
+        return float(np.sum(np.square(asked.basis.T @ self.z)))
+
+    def chance(self, asked: AskedError, by_residuals: bool = False) -> float:
+        """Probability that a sound fit explains as much by this error; ``by_residuals``: as if these alone told the
+        noise, which ranks errors where all doubt has gone."""
+        from scipy.special import chdtrc, fdtrc
+
+        m, S = asked.count, self.explained(asked)
+        nu = 0.0 if by_residuals else self.noise_dof
+        if math.isinf(nu):
+            return float(chdtrc(m, S))
+        left = max(self.squares - S, 1e-12 * self.squares) + nu
+        free = max(self.dof - m, 1) + nu
+        return float(fdtrc(m, free, S / m * free / left)) if left > 0.0 else 1.0
+
+    def shift(self, asked: AskedError) -> Array:
+        """Shift (p,) of the values by the error of the size that the residuals show."""
+        return np.asarray(asked.reach @ (asked.basis.T @ self.z))
+
+    def without(self, asked: AskedError) -> FitEvidence:
+        """The evidence with this error fitted as well."""
+        left = self.z - asked.basis @ (asked.basis.T @ self.z)
+        return FitEvidence(
+            left, self.inverse, np.hstack([self.fitted, asked.basis]), self.gain, self.noise_dof
+        )
+
+
+def evidence(
+    residuals: Array, covariance: Array, fitted: Array, gain: Array, noise_dof: float
+) -> FitEvidence:
+    """The evidence of a fit.
+
+    Parameters
+    ----------
+    residuals : (n,)
+    covariance : (n, n)
+        Of the residuals' readings.
+    fitted : (n, k)
+        Columns of all that was fitted, nuisances last.
+    gain : (p, n)
+        Change of the values by each reading.
+    noise_dof : float
+        As in `FitEvidence`.
+
+    Raises
+    ------
+    LinAlgError
+        The covariance is not positive definite.
+    """
+    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+    white = inverse @ fitted
+    length = np.linalg.norm(white, axis=0)
+    basis, s, _ = np.linalg.svd(white / np.where(length > 0.0, length, 1.0), full_matrices=False)
+    basis = basis[:, s > _RANK * s.max(initial=0.0)]
+    z = inverse @ residuals
+    return FitEvidence(z - basis @ (basis.T @ z), inverse, basis, gain, noise_dof)
