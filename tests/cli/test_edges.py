@@ -202,7 +202,10 @@ def test_a_decimal_comma_is_recognised(folder, capsys):
 
 
 def test_new_names_the_files_it_wrote_and_asks_for_the_rate(folder, capsys):
-    Path("raw.csv").write_text("ax,ay,az\n" + "".join(f"0.{i % 7},0.2,9.8\n" for i in range(50)))
+    rows = (f"0.{i % 7},0.2,9.8,0.00{i % 5},0.001,0.002\n" for i in range(5000))  # samples, not rows of means
+    Path("raw.csv").write_text(
+        "acc_x,acc_y,acc_z,gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]\n" + "".join(rows)
+    )
     assert run(["new", "imu", "raw.csv", "--set", "site.latitude=48 deg", "--out", "my.toml"]) == 0
     next_line = "# Next: inercal calibrate imu raw.csv --map my-map.toml --study my.toml\n"
     assert next_line in Path("my.toml").read_text("utf-8")

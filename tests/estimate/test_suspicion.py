@@ -148,5 +148,5 @@ def test_causes_are_told_by_their_rank():
     ranks = [each.rank for each in CODES.values() if each.rank]
     assert len(ranks) == len(set(ranks))
     assert {code for code, each in CODES.items() if each.gross} == {
-        "unit_suspect", "channel_swap", "sign_suspect", "command_shift",
+        "unit_suspect", "channel_swap", "sign_suspect", "command_shift", "row_order",
     }  # fmt: skip

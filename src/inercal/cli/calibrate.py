@@ -110,7 +110,7 @@ def _calibrated(
     clock = time.perf_counter()
     system = the_study.system
     if system.sections is not None:  # the table of sections is no recording, though `*.csv` takes it in
-        tables = {path.resolve() for path in the_study.files}
+        tables = {path.resolve() for path in the_study.files} - {study.resolve()}
         files = [file for file in files if file.resolve() not in tables]
     records = read_repeats(files, map_file, output, span, system.counted(the_study.settings))
     read_s = time.perf_counter() - clock
