@@ -13,7 +13,7 @@ G0 = 9.80665
 
 SIZES = {
     "m/s^2": 1.0, "g": G0, "mg": G0 / 1000.0, "cm/s^2": 0.01,
-    "rad/s": 1.0, "deg/s": np.pi / 180.0, "mdeg/s": np.pi / 180e3, "deg/h": np.pi / 648e3,
+    "rad/s": 1.0, "deg/s": np.pi / 180.0, "mrad/s": 1e-3, "mdeg/s": np.pi / 180e3, "deg/h": np.pi / 648e3,
 }  # fmt: skip
 """Sizes of units in m/s^2 and rad/s."""
 

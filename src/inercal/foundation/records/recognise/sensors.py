@@ -62,7 +62,8 @@ def sensors(
     found = [] if acc is None else [_with_acc_unit(acc, values)]
     gyro, seen = _gyro(triads, acc, values, t)
     if gyro is not None:
-        found.append(_with_gyro_unit(gyro, seen, values, t is not None))
+        beside_counts = any("count" in triad.units for triad in found)
+        found.append(_with_gyro_unit(gyro, seen, values, t is not None, beside_counts))
     return found
 
 
@@ -161,8 +162,11 @@ def _with_acc_unit(triad: _Named, values: Array) -> SensorFound:
     return _alike("acc", triad, "count", "likely", reason + (", whole numbers" if whole else ""))
 
 
-def _with_gyro_unit(triad: _Named, seen: SeenTurns | None, values: Array, timed: bool) -> SensorFound:
-    """The gyro with its units: as stated, by its turns, by the steps of its converter, or by its reach."""
+def _with_gyro_unit(
+    triad: _Named, seen: SeenTurns | None, values: Array, timed: bool, beside_counts: bool
+) -> SensorFound:
+    """The gyro with its units: as stated, by its turns, by the steps of its converter, or by its reach, which beside
+    accelerometers in counts is that of counts where it is too large for deg/s."""
     rates = values[:, triad.columns]
     stated = tuple(word.unit for word in triad.said)
     words = "certain" if triad.sensor else "likely"
@@ -181,7 +185,9 @@ def _with_gyro_unit(triad: _Named, seen: SeenTurns | None, values: Array, timed:
             )
         return _alike("gyro", triad, "count", "likely", reason)
     if seen is not None and timed:
-        near = min(("rad/s", "deg/s", "mdeg/s"), key=lambda each: abs(np.log(SIZES[each] / seen.size)))
+        near = min(
+            ("rad/s", "deg/s", "mrad/s", "mdeg/s"), key=lambda each: abs(np.log(SIZES[each] / seen.size))
+        )
         if abs(SIZES[near] / seen.size - 1.0) < 0.15:
             share = seen.size / SIZES[near]
             reason = f"the turns that the accelerometers see say {near} ({share:.3f}, u {seen.u:.1%})"
@@ -190,10 +196,11 @@ def _with_gyro_unit(triad: _Named, seen: SeenTurns | None, values: Array, timed:
         return _alike("gyro", triad, unit, "likely", f"all lie on steps of a converter, written in {unit}")
     reach = float(np.nanmax(np.abs(rates - np.nanmedian(rates, axis=0))))
     if reach > 35.0:
-        unit = "deg/s" if reach < 4100.0 else "mdeg/s"
-        return _alike(
-            "gyro", triad, unit, "likely", f"the largest move is {reach:.4g}, which is none in rad/s"
-        )
+        if reach < 4100.0:
+            reason = f"the largest move is {reach:.4g}, which is none in rad/s"
+            return _alike("gyro", triad, "deg/s", "likely", reason)
+        reason = f"the largest move is {reach:.4g}, which is none in deg/s"
+        return _alike("gyro", triad, "count" if beside_counts else "mdeg/s", "likely", reason)
     noise = float(np.nanmedian(np.abs(np.diff(rates, axis=0))))
     unit = "deg/s" if noise > 0.012 and reach > 5.0 else "rad/s"
     reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}; check whether deg/s or rad/s"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
+
+from inercal.foundation.records.read.limits import TITLE
 
 #: unit -> its spellings, reduced as by `unit_of`
 _UNITS = {
@@ -93,8 +96,11 @@ def words_of(name: str) -> list[str]:
     return parted
 
 
+@functools.lru_cache(1 << 14)
 def said(name: str, beside: str | None = None) -> Said:
-    """Meaning of the ``name`` of a column, and of the unit stated ``beside`` it."""
+    """Meaning of the ``name`` of a column, and of the unit stated ``beside`` it; none of one too long for a title."""
+    if len(name) > TITLE or len(beside or "") > TITLE:
+        return Said()
     brackets = re.findall(r"[\[(]((?![012]\])[^\[\]()]*(?:\([^()]*\))?)[\])]", name)
     unit = next((unit for text in (beside or "", *reversed(brackets)) if (unit := unit_of(text))), "")
     words = words_of(re.sub(r"[\[(](?![012]\])[^\])]*[\])]", " ", name))
