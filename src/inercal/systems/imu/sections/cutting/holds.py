@@ -38,6 +38,7 @@ class Holds:
     calmest: int = 0
 
 
+@np.errstate(divide="ignore", invalid="ignore")  # what is not finite is no hold
 def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
     """Find the holds of a recording.
 
