@@ -96,8 +96,15 @@ def test_from_a_dropped_log_to_a_certificate(tab, bench, log, tmp_path):
     page.wait_for_selector("[data-findings]")
     for axis in "xyz":  # the header does not say it, the turns do
         field = page.locator(f'input[aria-label="unit of gyro_{axis}"]')
-        field.fill("mrad/s")
-        field.press("Tab")
+        assert field.input_value() == "mrad/s"
+        for unit in ("deg/s", "mrad/s"):  # another one, and back
+            field.fill(unit)
+            field.press("Tab")
+            page.wait_for_function(
+                """([axis, unit]) => document.querySelector('[aria-label="text of study-map.toml"]').value
+                   .split(`[columns.gyro_${axis}]`)[1].split('[columns')[0].includes(`"${unit}"`)""",
+                arg=[axis, unit],
+            )
     page.wait_for_function("""() => document.querySelector('[aria-label="text of study-map.toml"]').value
                               .split('"mrad/s"').length === 4""")  # fmt: skip
     click("text=Study")

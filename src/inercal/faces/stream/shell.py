@@ -111,7 +111,7 @@ class SystemOnStream(ABC, Generic[S]):
     Parameters
     ----------
     every : float
-        LineInterval [s] of the lines, in the time of the record; 0 for a line each row.
+        Interval [s] of the lines, in the time of the record; 0 for a line each row.
     say : callable
         Takes the findings.
     """
