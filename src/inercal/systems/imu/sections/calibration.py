@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -22,13 +23,17 @@ from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
 from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.solve import solved
+from inercal.systems.imu.sections.solve import FAR, NEAR, solved
 from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, LOCAL, SWIVEL, TILT, S
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, SWIVEL, TILT, S
 
 _SOFTENED: Final = (1e-3, 3e-5, 1e-6)
 """Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
 tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
+
+_SETTLED: Final = 0.02
+_SHORTENED: Final = 1e-8
+"""Changes of the logarithms of scatters, and of the parts that tilts take from lengths, that end their rounds."""
 
 _SOFT: Final = 100.0
 """Growth of a variance up to which it makes no other valley."""
@@ -75,8 +80,6 @@ class SectionCalibration:
     """True where the prior of the scale factors was dropped, since the sections deny it."""
     residuals: Array
     """Outputs (n, 3 kinds, 3 axes) less those of the model."""
-    outlying: Array
-    """Probabilities (n,) that a sound section lies as far off all others."""
     placed: Array
     """Angles (n, 2) by which verticals and axes lie off what is said of them [rad], 0 where nothing is."""
     placed_sigmas: Array
@@ -84,6 +87,16 @@ class SectionCalibration:
     converged: bool
     problem: Problem
     point: Iterate
+    linear: Linear
+    z: Array
+    """The linear problem at the point, and the likeliest logarithms (c,) of the scatters."""
+
+    @cached_property
+    def outlying(self) -> Array:
+        """Probabilities (n,) that a sound section lies as far off all others."""
+        if not self.converged:
+            return np.ones(len(self.problem.readings.sections))
+        return outlying(self.linear, self.z, self.linear.at(self.z))
 
     def value(self, name: str) -> tuple[float, float, float]:
         """Value, u and U of a coefficient."""
@@ -158,43 +171,56 @@ def contradicted(found: SectionCalibration) -> bool:
     )
 
 
-def _calibrated(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> SectionCalibration:
+def _calibrated(
+    sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...], start: Iterate | None = None
+) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    found = _result(_fit(problem_of(sections, priors, extras)))
-    new = {sensor for sensor, p in found.agreement.items() if p < LIMITS.contradiction} - priors.excess
+    fit = _fit(problem_of(sections, priors, extras), start)
+    rest, covariance = fit.linear.left(fit.z, fit.linear.at(fit.z))[0]
+    agreement = of_sensors(fit.problem, rest, covariance)
+    new = {sensor for sensor, p in agreement.items() if p < LIMITS.contradiction} - priors.excess
     if new:
-        return _calibrated(sections, replace(priors, excess=priors.excess | new), extras)
-    return found
+        near = fit.point if fit.converged else None
+        return _calibrated(sections, replace(priors, excess=priors.excess | new), extras, near)
+    return _result(fit, agreement)
 
 
-def _fit(problem: Problem) -> _Fit:
-    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes.
+def _fit(problem: Problem, start: Iterate | None) -> _Fit:
+    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes; from ``start`` on
+    where a point near the solution is known.
 
     Where noise is far below what coefficients and tilts do together, the valley of the sum of squares is too bent for
     the search; what they take from lengths then counts as noise, and once more as curvature: u is on the safe side.
     """
-    fitted = _fit_by(problem, whole=False)
-    return fitted if fitted.converged else _fit_by(problem, whole=True)
+    fitted = _fit_by(problem, start, whole=False)
+    return fitted if fitted.converged else _fit_by(problem, None, whole=True)
 
 
-def _fit_by(problem: Problem, *, whole: bool) -> _Fit:
+def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
     """Solve; ``whole``: what coefficients leave open of tilts counts as noise as well."""
-    z, point = np.array([np.log(size.median) for size in problem.sizes.values()]), first_guess(problem)
+    z = np.array([np.log(size.median) for size in problem.sizes.values()])
+    point = first_guess(problem) if start is None else start
     spread, noise = np.eye(len(z)), _noise(problem, point, z)
     problem = with_classes(problem, noise)
-    for part in _SOFTENED:
+    for part in _SOFTENED if start is None else ():
         softer = _softened(problem, part)
         if softer is not None:
             point, _, _ = solved(softer, point, z)
+    damping = FAR if start is None else NEAR
     for _ in range(3):
-        point, linear, converged = solved(problem, point, z)
-        z, spread = mode(linear, z)
+        point, linear, converged = solved(problem, point, z, damping)
+        damping = NEAR if converged else FAR
+        before, (z, spread) = z, mode(linear, z)
         least_known = z + 2.0 * np.linalg.norm(
             spread, axis=1
         )  # a scatter that may be small makes no fine instrument
         problem = with_classes(problem, _noise(problem, point, least_known))
+        short = point.short
         point = _shortened(problem, point, linear, linear.at(z), z, whole=whole)
-    point, linear, converged = solved(problem, point, z)
+        change = np.max(np.abs(point.short - short), initial=0.0)
+        if converged and np.max(np.abs(z - before), initial=0.0) < _SETTLED and change < _SHORTENED:
+            break
+    point, linear, converged = solved(problem, point, z, damping)
     return _Fit(problem, point, linear, z, spread, converged)
 
 
@@ -241,7 +267,7 @@ def _shortened(
     return replace(point, short=short, loss=loss)
 
 
-def _result(fit: _Fit) -> SectionCalibration:
+def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
     """Mean and covariance over what is left open of the variances, with 95 % limits of the mixture."""
     problem, linear, x = fit.problem, fit.linear, fit.point.x
     count = int(np.sum(linear.shared < len(COEFFICIENTS)))
@@ -281,7 +307,6 @@ def _result(fit: _Fit) -> SectionCalibration:
     open_ends = int(np.sum(~np.isfinite(linear.sd(z))))
     freedom = float(sum(np.count_nonzero(np.einsum("ckk->ck", C)) for _, C in left) - open_ends)
     placed, sigmas = of_placing(problem, fit.point, linear, z, best)
-    means = left[0]
     return SectionCalibration(
         names=names,
         x=value,
@@ -305,16 +330,17 @@ def _result(fit: _Fit) -> SectionCalibration:
         chi2=best.chi2,
         freedom=freedom,
         probability=float(chdtrc(freedom, best.chi2)) if freedom > 0.0 else 1.0,
-        agreement=of_sensors(problem, *means),
+        agreement=agreement,
         excess=problem.priors.excess,
         freed=False,
         residuals=misfit(problem, fit.point),
-        outlying=outlying(linear, z, best) if fit.converged else np.ones(len(x[problem.shared :]) // LOCAL),
         placed=placed,
         placed_sigmas=sigmas,
         converged=fit.converged,
         problem=problem,
         point=fit.point,
+        linear=linear,
+        z=z,
     )
 
 

@@ -131,6 +131,9 @@ class Limits:
     open_scale: float = 0.5
     """Relative standard deviation of a scale of the gyro that nothing but moves tells."""
 
+    turned_vertical: float = math.radians(10.0)
+    """Angle [rad] between the verticals of two rests from which a gyro has to see a motion between them."""
+
     raised_u: float = 1.2
     """Growth of u of the accelerometers by moves, from which these have no say in them."""
 

@@ -95,6 +95,10 @@ def calibrate_from_sections(
         return CalibrationFromSections(timed(estimate, clock), sections)
     priors = _priors(settings, units)
     lacking = missing(sections, priors)
+    if lacking is not None and all(name.startswith("S_") for name in lacking.terms):
+        # rests show too little of Earth's rate: moves tell the scale of the gyro, or nothing does
+        priors = replace(priors, scale_by_earth=False)
+        lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
         cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"

@@ -59,9 +59,14 @@ def calibrate_with_moves(
     LinAlgError
         Too little is known for any solution.
     """
-    left_out = not_whole(moves)
-    used = tuple(k for k in range(len(moves)) if k not in {each.move for each in left_out})
     alone = calibrate_sections([replace(s, gyro=None, gyro_var=None) for s in sections], priors)
+    left_out = not_whole(moves)
+    whole = [k for k in range(len(moves)) if k not in {one.move for one in left_out}]
+    left_out += tuple(
+        MoveLeftOut(whole[one.move], one.why)
+        for one in not_seen([moves[k] for k in whole], sections, priors, verticals_of(alone))
+    )
+    used = tuple(k for k in range(len(moves)) if k not in {one.move for one in left_out})
     kept = [moves[k] for k in used]
     if not kept:
         joint = calibrate_sections(sections, priors)
@@ -99,6 +104,41 @@ def not_whole(moves: Sequence[Move]) -> tuple[MoveLeftOut, ...]:
     return tuple(out)
 
 
+def not_seen(
+    moves: Sequence[Move], sections: Sequence[Section], priors: Priors, up: Array
+) -> tuple[MoveLeftOut, ...]:
+    """Moves in which the verticals ``up`` (n, 3) of rests turn by far more than the gyro did: rows are missing. Where
+    nothing tells the size of the gyro's outputs, and no vertical turns, all: they leave its scale open."""
+    if not moves:
+        return ()
+    bias = _rest_bias(sections)
+    swept = np.array(
+        [float(np.sum(np.linalg.norm(move.gyro[1:] - bias, axis=1) * np.diff(move.t))) for move in moves]
+    )
+    cosine = [np.clip(up[move.first] @ up[move.last], -1.0, 1.0) for move in moves]
+    angle = np.arccos(cosine)
+    told = any(s.kind != "rest" and s.gyro is not None for s in sections)
+    size = priors.gyro_scale
+    least = float(np.max(swept)) / LIMITS.largest_sweep if size is None else (1.0 - size.spread) * size.median
+    missing = (angle > LIMITS.turned_vertical) & (swept < 0.5 * least * angle)
+    out = [
+        MoveLeftOut(int(k), "the vertical turns and the gyro does not: rows are missing")
+        for k in np.flatnonzero(missing)
+    ]
+    if size is None and not told and not np.any((angle > LIMITS.turned_vertical) & ~missing):
+        open_still = "it turns about the vertical, which leaves the scale of a gyro in counts open"
+        out += [MoveLeftOut(int(k), open_still) for k in np.flatnonzero(~missing)]
+    return tuple(out)
+
+
+def _rest_bias(sections: Sequence[Section]) -> Array:
+    """Median output (3,) of the gyro at rest, 0 where it was never."""
+    rests = [
+        s.gyro for s in sections if s.kind == "rest" and s.gyro is not None and np.isfinite(s.gyro).all()
+    ]
+    return np.median(rests, axis=0) if rests else np.zeros(3)
+
+
 def _scaled(
     sections: Sequence[Section], moves: Sequence[Move], priors: Priors, alone: SectionCalibration
 ) -> tuple[Priors, bool]:
@@ -107,11 +147,9 @@ def _scaled(
     if any(s.kind != "rest" and s.gyro is not None for s in sections):
         return priors, False
     said = priors.gyro_scale
-    up = _verticals(alone)
-    rests = np.array([s.gyro for s in sections if s.gyro is not None and np.isfinite(s.gyro).all()])
-    bias = np.median(rests, axis=0) if len(rests) else np.zeros(3)
+    up = verticals_of(alone)
     coarse = _thinned(increments(moves))
-    raw = coarse.gyro - coarse.dt[..., None] * bias
+    raw = coarse.gyro - coarse.dt[..., None] * _rest_bias(sections)
     ends = np.array([(move.first, move.last) for move in moves])
 
     def missed(scale: float) -> float:
@@ -130,7 +168,7 @@ def _scaled(
     return replace(priors, gyro_scale=Size(float(scales[best]), LIMITS.open_scale)), said is not None
 
 
-def _verticals(found: SectionCalibration) -> Array:
+def verticals_of(found: SectionCalibration) -> Array:
     """Directions of specific force (n, 3) of a calibration."""
     x = found.point.x
     return np.asarray(verticals(found.problem, found.point, x[:COMMON], effective(found.problem, x)).real)

@@ -102,10 +102,10 @@ def swings_of(
 
 
 def with_moves_between(rows: Sequence[SectionRow]) -> list[SectionRow]:
-    """The rows of one log with a move between each two rests that follow each other, unless a turn or a steady rate
-    lies between: never both for one motion, and a whole turn by a gyro in counts leaves its scale ambiguous."""
+    """The rows of one log with a move between each two rests that follow each other, unless a steady rate lies
+    between. A turn whose angle is not known counts as a move until somebody states it."""
     rests = sorted((row for row in rows if row.kind == "rest"), key=lambda row: row.begin or 0.0)
-    turning = [row for row in rows if row.kind in ("turn", "rate")]
+    turning = [row for row in rows if row.kind == "rate"]
     moves = []
     for number, (first, last) in enumerate(pairwise(rests), 1):
         begin, end = first.end or 0.0, last.begin or 0.0

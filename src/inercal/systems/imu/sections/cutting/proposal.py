@@ -85,7 +85,7 @@ class Proposal:
         scales = {_scale(file.record) for file in files if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
         asked = [*questions, *contradictions(sections, scale)]
-        notes = tuple(one for one in asked if not one.harm and one.code != "not_stated")
+        notes = tuple(one for one in asked if not one.harm)
         asked = [one for one in asked if one not in notes]
         return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), notes)
 
