@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -93,7 +94,8 @@ def calibrate(
         raise InputError("compare", f"found with a study of kind {study.kind}, expected one of {expected}")
     if system.prepare:
         system.prepare(study, compare)
-    return system.calibrate(runs, study, compare, progress)
+    with _one_thread():
+        return system.calibrate(runs, study, compare, progress)
 
 
 def runs(
@@ -149,7 +151,18 @@ def runs(
         )
     if system.prepare:
         system.prepare(given, compare)
-    return system.runs(table, given, lambda path: read(path, map), compare, progress)
+    with _one_thread():
+        return system.runs(table, given, lambda path: read(path, map), compare, progress)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Linear algebra by one thread: of the small matrices here, two take up to twenty times the time of one."""
+    import scipy.linalg  # noqa: F401  its library of its own has to be there before it is told
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def _imu_study(record: Record, given: dict[str, str]) -> Study:
