@@ -29,6 +29,7 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.terms import GYRO_TRIAD
 from inercal.systems.imu.figures import page, pictures
+from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.settings import (
     Exclusion,
     ImuSettings,
@@ -47,7 +48,7 @@ def covered(method, runs, seed):
     for _ in range(runs):
         truth, estimate = drawn(method, rng)
         ends = [p.interval() for p in estimate.parameters.values()]
-        inside += [low <= value <= high for (low, high), value in zip(ends, truth, strict=True)]
+        inside += [low <= value <= high for (low, high), value in zip(ends, truth, strict=False)]  # K2 last
         ok.append(estimate.status is Status.OK)
     return float(np.mean(inside)), float(np.mean(ok))
 
@@ -72,7 +73,8 @@ def test_exact_rows_give_the_truth():
     """Closed form: rows without noise are fitted to rounding."""
     rng = np.random.default_rng(1)
     truth, outputs = triad(rng, 400.0)
-    np.testing.assert_allclose(by_means(outputs(G * directions(rng, 14))).values, truth, rtol=1e-8, atol=1e-8)
+    found = by_means(outputs(G * directions(rng, 14))).values[:9]
+    np.testing.assert_allclose(found, truth, rtol=1e-7, atol=1e-7)
     truth, outputs = triad(rng, 4000.0)
     rows = [outputs(rate * directions(rng, 12)) for rate in RATES]
     np.testing.assert_allclose(by_rates(rows).values, truth, rtol=1e-7, atol=1e-6)
@@ -101,8 +103,34 @@ def test_poses_in_a_plane_leave_terms_open_and_say_so():
     flat = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     estimate = by_means(outputs(G * flat) + 0.3 * rng.normal(size=(14, 3)))
     assert estimate.status is Status.UNOBSERVABLE
+    assert "K1_z open" in estimate.message
     assert "z up" in estimate.message
-    assert by_means(outputs(G * directions(rng, 8))).status is Status.TOO_FEW_INTERVALS
+
+
+def test_few_poses_say_which_terms_are_by_prior():
+    """Four poses of any direction leave scale factors open; nine are enough with what is usual of the rest."""
+    rng = np.random.default_rng(3)
+    truth, outputs = triad(rng, 400.0)
+    values = outputs(G * directions(rng, 9))
+    assert by_means(values[:4]).status is Status.UNOBSERVABLE
+    estimate = by_means(values)
+    assert {"by_prior", "scatter_by_prior"} <= {finding.code for finding in estimate.findings}
+    assert np.all(np.abs(estimate.values[:9] - truth) < 3.0 * estimate.u[:9])
+
+
+@for_each("k2", [{"k2_u": 0.0}, {"k2": True}])
+def test_pose_means_are_those_of_the_fit_of_poses(k2):
+    """With K2 known or fitted: within 0.05 u of `fit_accelerometer`, which knows no priors and no likelihood of
+    variances, and u within 4 %, for it is told by few rows."""
+    for seed in (1, 2, 3):
+        truth, values = pose_means(np.random.default_rng(seed))
+        estimate = by_means(values, **k2)
+        fit = fit_accelerometer(values, G, squares="k2" in k2).fit
+        u = np.sqrt(np.diag(fit.unit_covariance) * fit.chi2 / fit.dof)
+        u = np.hypot(u, np.where(np.arange(len(u)) // 3 == 1, 2e-4 / G * fit.x, 0.0))
+        assert np.all(np.abs(estimate.values - fit.x) < 0.05 * u)
+        np.testing.assert_allclose(estimate.u, u, rtol=0.05)
+        assert len(truth) == 9
 
 
 def test_the_mean_of_a_moving_pose_is_named_and_can_be_left_out():
@@ -110,19 +138,22 @@ def test_the_mean_of_a_moving_pose_is_named_and_can_be_left_out():
     truth, values = pose_means(rng)
     values[7] = truth[:3] + 1.005 * (values[7] - truth[:3])
     estimate = by_means(values)
-    (finding,) = [each for each in estimate.findings if each.code == "outlying_pose"]
+    (finding,) = [each for each in estimate.findings if each.code == "outlying_section"]
     assert "pose 8" in finding.message
     assert estimate.status is Status.SUSPECT
     without = by_means(values, exclude=Exclusion(poses=(8,)))
     assert without.status is Status.OK
-    assert np.all(np.abs(without.values - truth) < 4.0 * without.u)
+    assert np.all(np.abs(without.values[:9] - truth) < 4.0 * without.u[:9])
+    assert [row["section"] for row in without.result["sections"]] == [
+        f"pose {n}" for n in range(1, 25) if n != 8
+    ]
 
 
 def test_samples_of_a_recording_are_no_pose_means():
     from inercal.foundation.errors import RecordError
 
     record, _ = shipped("xsens")
-    with pytest.raises(RecordError, match=r'most of them like the one before.* imu.method = "multiposition"'):
+    with pytest.raises(RecordError, match="most of them like the one before, expected one row for each pose"):
         calibrate(record, ImuSettings(SITE, method=MeansSettings()))
 
 
@@ -242,7 +273,7 @@ def test_pose_means_of_a_real_unit_give_what_its_recording_gives():
     means = calibrate(
         record_of("acc", whole.poses.means), ImuSettings(settings.site, method=MeansSettings())
     ).estimate
-    np.testing.assert_allclose(means.values, whole.estimate.values[:9], rtol=1e-6, atol=1e-6)
+    assert np.all(np.abs(means.values[:9] - whole.estimate.values[:9]) < 0.6 * whole.estimate.u[:9])
     assert means.status is Status.OK
 
 
@@ -302,6 +333,6 @@ def test_pages_show_the_method(method):
         options = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), TILT)
     calibration = calibrate_files(records, ImuSettings(SITE, method=options))
     titles = [picture.title for picture in pictures(calibration)]
-    assert titles[0] == {"means": "Poses", "known_rates": "Orientations", "known_turns": "Turns"}[method]
+    assert titles[0] == {"means": "Directions", "known_rates": "Orientations", "known_turns": "Turns"}[method]
     assert len(titles) >= 4
     assert titles[0] in page(calibration)
