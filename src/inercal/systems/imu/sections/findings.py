@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.special import chdtrc
 
 from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.records.places import counted, counted_names
@@ -28,6 +29,7 @@ def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
     return (
         *_contradictions(found),
         *_signs(found),
+        *_rates(found),
         *(() if found.problem.extras else _outlying(found)),
         *_scatters(found),
         *_placing(found),
@@ -106,11 +108,30 @@ def _signs(found: SectionCalibration) -> Iterator[Finding]:
             )
 
 
+def _rates(found: SectionCalibration) -> Iterator[Finding]:
+    """The rate that fits the others least, where the sum of squares of all sections hides how little."""
+    group = max(found.pulled_rates, key=lambda name: abs(found.pulled_rates[name]), default="")
+    if group and chdtrc(len(found.pulled_rates), found.pulled_rates[group] ** 2) < LIMITS.contradiction:
+        size = abs(found.pulled_rates[group])
+        yield Finding(
+            "rate_suspect",
+            f"Rates contradict each other: that of {group} differs by {size:.1f} times what was stated.",
+            group,
+            EVERYTHING,
+            action="Check order, values and u of the rates, whether the gyro is linear, and its g-sensitivity, "
+            "which on a level table adds the same to every rate.",
+            items=tuple(
+                {"rate": name, "off [of its u]": round(float(pull), 1)}
+                for name, pull in found.pulled_rates.items()
+            ),
+        )
+
+
 def _outlying(found: SectionCalibration) -> Iterator[Finding]:
     """The section that lies farthest off all others, left out in turn."""
     p = found.outlying
     k = int(np.argmin(p))
-    if p[k] < IMU_LIMITS.outlier_risk / max(int(np.sum(p < 1.0)), 1):
+    if p[k] < IMU_LIMITS.outlier_risk / len(p):
         yield Finding(
             "outlying_section",
             f"{_section(found, k)} lies off what all other sections say (p = {p[k]:.1g}).",

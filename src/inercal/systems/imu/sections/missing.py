@@ -13,6 +13,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.sections.arrow import Linear
+from inercal.systems.imu.sections.calibration import SOFTENED, softened
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.priors import Priors
@@ -58,6 +59,7 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
 def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> dict[str, float]:
     """Of each coefficient without a prior its u over that from which it is open, by name."""
     problem = problem_of(sections, priors, extras)
+    problem = softened(problem, SOFTENED[-1]) or problem  # what is open does not hang on noise that small
     point = centred(problem, first_guess(problem))
     linear = Linear(problem, point.x, rows(problem, point))
     z = np.array([np.log(size.median) for size in problem.sizes.values()])

@@ -173,9 +173,7 @@ def _numbered(rows: Sequence[SectionRow]) -> tuple[SectionRow, ...]:
 def _without(proposal: Proposal, exclude: Exclusion) -> Proposal:
     """The proposal without the poses that the study leaves out."""
     if exclude.times:
-        raise StudyError(
-            "imu.exclude", 'found a time, expected numbers, such as "pose 12": poses are counted here'
-        )
+        raise StudyError("imu.exclude", 'found a time, expected numbers, such as "pose 12"')
     left = [f"pose {number}" for number in exclude.poses]
     there = {row.section for row in proposal.rows}
     for name in left:
