@@ -25,15 +25,17 @@ from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import FAR, NEAR, solved
 from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, SWIVEL, TILT, S
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, K1, SWIVEL, TILT, S
 
-_SOFTENED: Final = (1e-3, 3e-5, 1e-6)
+SOFTENED: Final = (1e-3, 3e-5, 1e-6)
 """Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
 tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
 
 _SETTLED: Final = 0.02
 _SHORTENED: Final = 1e-8
 """Changes of the logarithms of scatters, and of the parts that tilts take from lengths, that end their rounds."""
+_FINEST: Final = 1e-9
+"""Noise of means, as a part of the largest output, that counts at least: rounding rules below."""
 
 _SOFT: Final = 100.0
 """Growth of a variance up to which it makes no other valley."""
@@ -84,6 +86,8 @@ class SectionCalibration:
     """Angles (n, 2) by which verticals and axes lie off what is said of them [rad], 0 where nothing is."""
     placed_sigmas: Array
     """The same over what was known of them."""
+    pulled_rates: dict[str, float]
+    """Errors of rates that sections share as found, in the standard deviations that they have where all is sound."""
     converged: bool
     problem: Problem
     point: Iterate
@@ -175,7 +179,8 @@ def _calibrated(
     sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...], start: Iterate | None = None
 ) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    fit = _fit(problem_of(sections, priors, extras), start)
+    problem = problem_of(sections, priors, extras)
+    fit = _fit(softened(problem, _FINEST) or problem, start)
     rest, covariance = fit.linear.left(fit.z, fit.linear.at(fit.z))[0]
     agreement = of_sensors(fit.problem, rest, covariance)
     new = {sensor for sensor, p in agreement.items() if p < LIMITS.contradiction} - priors.excess
@@ -202,8 +207,8 @@ def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
     point = first_guess(problem) if start is None else start
     spread, noise = np.eye(len(z)), _noise(problem, point, z)
     problem = with_classes(problem, noise)
-    for part in _SOFTENED if start is None else ():
-        softer = _softened(problem, part)
+    for part in SOFTENED if start is None else ():
+        softer = softened(problem, part)
         if softer is not None:
             point, _, _ = solved(softer, point, z)
     damping = FAR if start is None else NEAR
@@ -224,8 +229,8 @@ def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
     return _Fit(problem, point, linear, z, spread, converged)
 
 
-def _softened(problem: Problem, part: float) -> Problem | None:
-    """The problem with a noise of means of at least this part of the largest outputs; None where it is no less."""
+def softened(problem: Problem, part: float) -> Problem | None:
+    """The problem with a noise of means of at least this ``part`` of the largest outputs; None where it is no less."""
     r = problem.readings
     largest = np.array(
         [np.max(np.abs(r.y[:, kinds][r.seen[:, kinds]]), initial=0.0) for kinds in ([0, 1], [2])]
@@ -336,12 +341,26 @@ def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
         residuals=misfit(problem, fit.point),
         placed=placed,
         placed_sigmas=sigmas,
+        pulled_rates=_pulled_rates(problem, fit.point, linear, best),
         converged=fit.converged,
         problem=problem,
         point=fit.point,
         linear=linear,
         z=z,
     )
+
+
+def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowSolution) -> dict[str, float]:
+    """Errors of the rates of groups, over the part of their standard deviation that the sections take away."""
+    out, at = {}, linear.shared.tolist()
+    for k, name in enumerate(problem.readings.rate_groups):
+        p = COMMON + k
+        if p in at:
+            j = at.index(p)
+            told = problem.sd[p] ** 2 - best.covariance[j, j]
+            if told > LIMITS.told_rate * problem.sd[p] ** 2:
+                out[name] = float((point.x[p] + best.shared[j]) / np.sqrt(told))
+    return out
 
 
 def _in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:

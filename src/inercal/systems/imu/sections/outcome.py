@@ -21,7 +21,7 @@ from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.result import Estimate, timed
-from inercal.foundation.units import RAW
+from inercal.foundation.units import RAW, Quantity
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
@@ -34,9 +34,17 @@ from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.shorthands import (
+    Shorthand,
+    alone,
+    gyro_of_means,
+    proposal_of,
+    word_of,
+)
 from inercal.systems.imu.sections.swung import calibrate_swing
+from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -48,6 +56,7 @@ REFERENCES = (
 )
 _KNOWN = "axes of the case, by the known directions and axes"
 _OWN = "z along the input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z"
+_OF_GYRO = "z along the input axis of gyro z, y in the plane of the input axes of gyros y and z"
 
 
 @short_repr
@@ -63,10 +72,10 @@ class CalibrationFromSections:
 def calibrate_from_sections(
     records: Sequence[Record],
     settings: ImuSettings,
-    options: SectionsSettings,
+    options: SectionsSettings | Shorthand,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
-    """Calibrate from the sections that a study states, or that names and recordings tell.
+    """Calibrate from the sections that a study states, that names and recordings tell, or that a shorthand stands for.
 
     Raises
     ------
@@ -75,22 +84,32 @@ def calibrate_from_sections(
     """
     clock = time.perf_counter()
     progress("reading the sections")
-    named = by_file(records)
-    refuse_samples(named)
+    named, temperature = by_file(records), recorded_temperature(records[0])
+    if isinstance(options, SectionsSettings):
+        refuse_samples(named)
+        proposal = _proposal(named, options)
+        sections = tuple(_placed(section, options) for section in proposal.sections)
+        method, notes = "sections", proposal.notes
+    else:
+        named = {name: alone(record, options) for name, record in named.items()}
+        refuse_samples(named)
+        proposal = proposal_of(named, options, settings.exclude)
+        sections, method = proposal.sections, word_of(options)
+        notes = (*proposal.notes, *gyro_of_means(records, options))
+    records = list(named.values())
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    proposal = _proposal(named, options)
-    sections = tuple(_placed(section, options) for section in proposal.sections)
-    findings = (*_of_records(records), *proposal.questions, *proposal.notes)
+    findings = (*_of_records(records), *proposal.questions, *notes)
     sources = [source for record in records for source in record.sources]
     bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    none: Mapping[str, Any] = {"method": "sections", "sections": []}
+    none: Mapping[str, Any] = {"method": method, "sections": []}
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(
             timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
         )
     if not sections:
-        text = "found no section that can be read: state them in a table, imu.sections"
+        why = "; ".join(f"{name} {reason}" for name, reason in proposal.unused.items())
+        text = why or "found no section that can be read: state them in a table, imu.sections"
         estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     priors = _priors(settings, units)
@@ -101,8 +120,7 @@ def calibrate_from_sections(
         lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
-        cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
-        text = f"the sections leave {what} open: add {cure}"
+        text = f"the sections leave {what} open: add {lacking.cure}"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     progress("fitting the sections")
@@ -116,7 +134,10 @@ def calibrate_from_sections(
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
-    estimate = _estimate(found, settings, records, units, proposal, findings)
+    if isinstance(options, KnownRatesSettings):
+        findings = (*findings, *trend_findings(found))
+    estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
+    estimate = replace(estimate, result={**estimate.result, "method": method})
     return CalibrationFromSections(timed(estimate, clock), sections, found)
 
 
@@ -217,8 +238,8 @@ def refuse_samples(named: Mapping[str, Record]) -> None:
         if len(values) > IMU_LIMITS.most_poses and np.mean(alike) > 0.5:
             raise RecordError(
                 name,
-                f"found {len(values)} rows without times, most of them like the one before, expected a time column "
-                "t, or one row for each pose",
+                f"found {len(values)} rows, most of them like the one before, expected one row for each pose, or of "
+                'a recording a time column t and imu.method = "sections"',
             )
 
 
@@ -266,6 +287,7 @@ def _estimate(
     units: Mapping[str, Triad | None],
     proposal: Proposal,
     findings: Sequence[Finding],
+    temperature: Quantity | None,
 ) -> Estimate:
     """Put the estimate together."""
     triads = {sensor: triad for sensor, triad in units.items() if triad is not None}
@@ -277,9 +299,8 @@ def _estimate(
     known = bool(
         np.any(readings.know_up & readings.has_force) or np.any(readings.know_axis & (readings.rate != 0.0))
     )
-    conditions = conditions_of(
-        settings, recorded_temperature(records[0]), ranges, frame=_KNOWN if known else _OWN
-    )
+    own = _OWN if "acc" in triads else _OF_GYRO
+    conditions = conditions_of(settings, temperature, ranges, frame=_KNOWN if known else own)
     sources = [source for record in records for source in record.sources]
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     budget = tuple(
