@@ -9,6 +9,7 @@ tell its scale (Breusch and Pagan, Review of Economic Studies 47 (1980) 239).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,12 +83,29 @@ class FitEvidence:
 
     def ask(self, columns: Array) -> AskedError:
         """The combinations of an error's ``columns`` (n, k) that show."""
-        length = np.linalg.norm(self.inverse @ columns, axis=0)
+        return self.ask_all([columns])[0]
+
+    def ask_all(self, errors: Sequence[Array]) -> list[AskedError]:
+        """The combinations that show of several errors, each of columns (n, k)."""
+        if not errors:
+            return []
+        columns = np.hstack(errors)
+        white = self.inverse @ columns
+        length = np.linalg.norm(white, axis=0)
         length = np.where(length > 0.0, length, 1.0)
-        basis, s, vt = np.linalg.svd(self.beside(columns / length), full_matrices=False)
-        shown = s > SEEN
-        size = vt[shown].T / s[shown] / length[:, None]
-        return AskedError(basis[:, shown], size, self.gain @ columns @ size)
+        left = white / length
+        left -= self.fitted @ (self.fitted.T @ left)
+        moved = self.gain @ columns
+        ends = np.cumsum([error.shape[1] for error in errors]).tolist()
+        made = []
+        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
+            own = left[:, begin:end]
+            squares, vectors = np.linalg.eigh(own.T @ own)
+            shown = squares > SEEN**2
+            by = vectors[:, shown] / np.sqrt(squares[shown])
+            size = by / length[begin:end, None]
+            made.append(AskedError(own @ by, size, moved[:, begin:end] @ size))
+        return made
 
     def explained(self, asked: AskedError) -> float:
         """Sum of squares that the error takes away."""
@@ -100,6 +118,8 @@ class FitEvidence:
 
         m, S = asked.count, self.explained(asked)
         nu = 0.0 if by_residuals else self.noise_dof
+        if m == 0:
+            return 1.0
         if math.isinf(nu):
             return float(chdtrc(m, S))
         left = max(self.squares - S, 1e-12 * self.squares) + nu

@@ -90,8 +90,8 @@ def _asked(of_fit: FitEvidence, table: Sequence[Question]) -> list[tuple[Questio
     """Questions that show, those of one span once."""
     made, seen = [], set()
     probe = np.sin(1.0 + np.arange(len(of_fit.z)))
-    for question in table:
-        asked = of_fit.ask(question.columns)
+    every = of_fit.ask_all([question.columns for question in table])
+    for question, asked in zip(table, every, strict=True):
         if not _enough(of_fit, asked):
             continue
         span = (asked.count, round(float(np.sum(np.square(asked.basis.T @ probe))), 9))
@@ -140,6 +140,8 @@ def _order(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Finding
     ratio exceeds 1/r by chance with a probability of r at most (Markov).
     """
     rows = int(fit.row.max()) + 1
+    if fit.channel.min() < 0:
+        return
     if len(np.unique(fit.row * len(fit.channels) + fit.channel)) < rows * len(fit.channels) or rows < 4:
         return
     at = np.zeros((rows, len(fit.channels)), dtype=np.int64)
@@ -232,6 +234,8 @@ def _ends(fit: JudgedFit) -> Iterator[Finding]:
     """Channels with equal readings at an end where the model differs."""
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
+        if not len(own):
+            continue
         y, model = fit.readings[own], fit.predicted[own]
         if _grid(y, _rms(fit, own)) > 0.0 or not np.ptp(y):
             continue
@@ -253,6 +257,8 @@ def _steps(fit: JudgedFit) -> Iterator[Finding]:
     """Channels whose steps are larger than the scatter of their readings, and hence no noise."""
     for channel, name in enumerate(fit.channels):
         own = np.flatnonzero(fit.channel == channel)
+        if not len(own):
+            continue
         rms = _rms(fit, own)
         step = _grid(fit.readings[own], rms)
         if step <= rms:
