@@ -23,6 +23,10 @@ _RANK = 1e-10
 """Singular value of the fitted columns, over the largest, below which they are one column less."""
 
 
+_LOST = 1e-10
+"""Eigenvalue of what coefficients leave of columns of unit length, over the largest, below which it is rounding."""
+
+
 @dataclass(frozen=True, eq=False)
 class AskedError:
     """One error beside a fit of n residuals, of which m combinations show.
@@ -58,6 +62,8 @@ class FitEvidence:
     noise_dof : float
         Degrees of freedom of the noise in the covariance beside the residuals: inf where the noise is stated, 0 where
         the residuals alone tell it.
+    more : (squares, dof)
+        Sum of squares, and degrees of freedom, of residuals that no question reaches and that are left out of ``z``.
     """
 
     z: Array
@@ -65,16 +71,17 @@ class FitEvidence:
     fitted: Array
     gain: Array
     noise_dof: float
+    more: tuple[float, float] = (0.0, 0.0)
 
     @property
-    def dof(self) -> int:
+    def dof(self) -> float:
         """Degrees of freedom of the residuals."""
-        return int(self.fitted.shape[0] - self.fitted.shape[1])
+        return float(self.fitted.shape[0] - self.fitted.shape[1] + self.more[1])
 
     @property
     def squares(self) -> float:
         """Sum of squares of the white residuals."""
-        return float(self.z @ self.z)
+        return float(self.z @ self.z) + self.more[0]
 
     def beside(self, columns: Array) -> Array:
         """Columns (n, k) or (n,) less all that the fit takes up, whitened."""
@@ -134,7 +141,7 @@ class FitEvidence:
         """The evidence with this error fitted as well."""
         left = self.z - asked.basis @ (asked.basis.T @ self.z)
         return FitEvidence(
-            left, self.inverse, np.hstack([self.fitted, asked.basis]), self.gain, self.noise_dof
+            left, self.inverse, np.hstack([self.fitted, asked.basis]), self.gain, self.noise_dof, self.more
         )
 
 
@@ -167,3 +174,37 @@ def evidence(
     basis = basis[:, s > _RANK * s.max(initial=0.0)]
     z = inverse @ residuals
     return FitEvidence(z - basis @ (basis.T @ z), inverse, basis, gain, noise_dof)
+
+
+def of_normal_equations(
+    H: Array, g: Array, slope: Array, squares: float, dof: float, noise_dof: float
+) -> tuple[FitEvidence, Array]:
+    """The evidence of a fit whose nuisances are eliminated, and the columns (n, q) of what is asked in it.
+
+    Parameters
+    ----------
+    H, g : (p + q, p + q), (p + q,)
+        Normal equations of the p coefficients, at their solution, and behind them of q columns that are asked.
+    slope : (v, p)
+        Derivatives of the values by the coefficients.
+    squares, dof : float
+        Of all residuals of the fit.
+    noise_dof : float
+        As in `FitEvidence`.
+    """
+    p = slope.shape[1]
+    size = 1.0 / np.sqrt(np.where(np.diag(H) > 0.0, np.diag(H), 1.0))
+    scaled = H * np.outer(size, size)
+    root = np.linalg.cholesky(scaled[:p, :p])
+    by = np.linalg.solve(root, scaled[:p, p:])
+    rest = scaled[p:, p:] - by.T @ by
+    values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
+    kept = values > _LOST * max(float(values[-1]), _LOST)
+    length = np.sqrt(values[kept])
+    score = size[p:] * g[p:] - by.T @ np.linalg.solve(root, size[:p] * g[:p])
+    z = np.concatenate([np.zeros(p), vectors[:, kept].T @ score / length])
+    columns = np.vstack([by, length[:, None] * vectors[:, kept].T]) / size[p:]
+    n = len(z)
+    gain = np.hstack([slope * size[:p] @ np.linalg.inv(root).T, np.zeros((len(slope), n - p))])
+    more = max(squares - float(z @ z), 0.0), dof - (n - p)
+    return FitEvidence(z, np.eye(n), np.eye(n)[:, :p], gain, noise_dof, more), columns

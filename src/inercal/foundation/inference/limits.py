@@ -33,6 +33,9 @@ class Limits:
     fewest_degrees: int = 3
     """Degrees of freedom from which a fit is asked."""
 
+    noiseless: float = 0.1
+    """Residuals, over the stated noise, up to which a filter's record is a simulation without noise."""
+
     rounding: float = 1e-8
     """Residuals, over readings, up to which a record is a simulation without noise: no table is as exact."""
 

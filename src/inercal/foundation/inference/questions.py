@@ -100,7 +100,8 @@ class JudgedFit:
 @dataclass(frozen=True, eq=False)
 class Question:
     """One pair: ``cell`` is order, place, reading or history; ``what`` (``plural`` or not) does what ``verb`` and
-    ``rest`` say, by the ``columns`` (n, m)."""
+    ``rest`` say, by the ``columns`` (n, m). Where the physics of a system names the cause, ``code`` and ``action`` are
+    those of its finding."""
 
     cell: str
     what: str
@@ -108,6 +109,8 @@ class Question:
     verb: str
     rest: str
     columns: Array
+    code: str = ""
+    action: str = ""
 
     @property
     def sentence(self) -> str:
@@ -182,20 +185,33 @@ def _as_one(names: Sequence[str], members: Sequence[int], by_value: Array) -> Ar
     return np.stack([by_value[:, at[one]] - by_value[:, at[other]] for one, other in pairs], axis=1)
 
 
-def _by_order(fit: JudgedFit) -> Iterator[Question]:
-    """Drift, bend, sway, settling and steps over time."""
-    s = (fit.time - fit.time.min()) / max(float(np.ptp(fit.time)), 1e-300)
-    shapes = [
+def over_time(time: Array) -> list[tuple[str, str, Array]]:
+    """Shapes (n, m) over the times (n,) of a record, behind what something does that has them: a verb, and the rest."""
+    s = (time - time.min()) / max(float(np.ptp(time)), 1e-300)
+    return [
         ("drift", "over the record", s[:, None]),
         ("bend", "over the record", np.stack([s, s**2, s**3], axis=1)),
         ("sway", "slowly", np.cos(math.pi * s[:, None] * np.arange(1, 7))),
         ("settle", "at the start", np.exp(-s[:, None] / np.array([0.05, 0.25]))),
         *(("step", f"at {100 * at:.0f} % of the record", (s > at).astype(float)[:, None]) for at in _STEPS),
     ]
+
+
+def lagging(x: Array) -> Array:
+    """A state (n,) that follows ``x`` (n,) from row to row."""
+    made, state = np.empty_like(x), 0.0
+    for k, value in enumerate(x):
+        state += _LAG * (value - state)
+        made[k] = state
+    return made
+
+
+def _by_order(fit: JudgedFit) -> Iterator[Question]:
+    """Drift, bend, sway, settling and steps over time."""
     for subject in _subjects(fit):
-        for verb, rest, shape in shapes:
+        for verb, rest, shape in over_time(fit.time):
             yield Question("order", subject.what, subject.plural, verb, rest, _times(subject.columns, shape))
-    late = (s > np.median(s)).astype(float)[:, None]
+    late = (fit.time > np.median(fit.time)).astype(float)[:, None]
     yield Question("order", "the values", True, "differ", "between the halves", fit.by_value * late)
 
 
@@ -277,14 +293,12 @@ def neighbours(fit: JudgedFit, x: Array, by: int) -> Array:
 
 
 def _lagging(fit: JudgedFit, x: Array) -> Array:
-    """A state that follows ``x`` (n,) from row to row."""
+    """A state that follows ``x`` (n,) from row to row in each channel."""
     made = np.zeros_like(x)
     for own in fit.per_channel.T:
         index = np.flatnonzero(own)
-        state = 0.0
-        for k in index[np.argsort(fit.row[index], kind="stable")]:
-            state += _LAG * (x[k] - state)
-            made[k] = state
+        index = index[np.argsort(fit.row[index], kind="stable")]
+        made[index] = lagging(x[index])
     return made
 
 

@@ -54,6 +54,9 @@ class Limits:
     erased_ratio: float = 20.0
     """Length of such a stretch, over what is usual elsewhere, from which they are none."""
 
+    noisy_steps: float = 0.7
+    """Second differences of an output over its first ones, from which it is noisy: of white noise 1.7."""
+
     fewest_runs: int = 30
     """Runs of equal values by which it is told whether each value stands for several rows."""
 

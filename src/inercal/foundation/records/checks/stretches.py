@@ -15,7 +15,7 @@ def erased(values: Array) -> NDArray[np.bool_]:
     """Rows (n,) of sensors' ``values`` (n, c) in stretches that repeat one row, as erased memory or a dead link does.
 
     A stretch counts if it is far longer than those that coarse outputs, or outputs written several times, have
-    elsewhere.
+    elsewhere, and if what is elsewhere is noisy: a rest in a simulation without noise is one row, too.
     """
     lengths = _runs(values)
     out = np.zeros(len(values), dtype=bool)
@@ -26,7 +26,14 @@ def erased(values: Array) -> NDArray[np.bool_]:
     long = lengths > max(LIMITS.erased_rows, LIMITS.erased_ratio * usual)
     if lengths[~long].sum() < LIMITS.erased_rows:
         return out
-    return np.repeat(long, lengths)
+    starts = np.cumsum(lengths) - lengths
+    return np.repeat(long, lengths) if _noisy(values[starts[~long]]) else out
+
+
+def _noisy(values: Array) -> bool:
+    """True where neighbours of values (n, c) in some column are no smooth motion."""
+    once, twice = (np.nanmedian(np.abs(np.diff(values, k, axis=0)), axis=0) for k in (1, 2))
+    return bool(np.any(twice > LIMITS.noisy_steps * once))
 
 
 def held(values: Array) -> float:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
-from inercal.foundation.inference.judge import judge
-from inercal.foundation.inference.questions import JudgedFit, StatedInput
+from inercal.foundation.inference.judge import asked_of, blind, evidence_of, judge
+from inercal.foundation.inference.questions import JudgedFit, StatedInput, questions
 from inercal.systems.imu.sections.calibration import SectionCalibration, in_outputs
 from inercal.systems.imu.sections.outputs import rows
 from inercal.systems.imu.sections.unknowns import COEFFICIENTS, LOCAL, RATE, S
@@ -19,8 +19,14 @@ _CHANNELS = (*(f"acc_{axis}" for axis in "xyz"), *(f"gyro_{axis}" for axis in "x
 
 
 def judged_sections(found: SectionCalibration) -> tuple[Finding, ...]:
-    """Findings about all that the sections and moves show beside the coefficients."""
-    return judge(fitted(found))
+    """Findings about all that the sections and moves show beside the coefficients, and about what they cannot show."""
+    fit = fitted(found)
+    try:
+        of_fit = evidence_of(fit)
+    except np.linalg.LinAlgError:
+        return ()
+    unseen = blind(fit.names, fit.u, of_fit, asked_of(of_fit, questions(fit))) if of_fit.dof > 0 else ()
+    return (*judge(fit), *unseen)
 
 
 class _Dense(NamedTuple):
