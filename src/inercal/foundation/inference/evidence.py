@@ -20,11 +20,8 @@ SEEN = 0.02
 """Length of a unit column outside the fit from which it shows."""
 
 _RANK = 1e-10
-"""Singular value of the fitted columns, over the largest, below which they are one column less."""
-
-
-_LOST = 1e-10
-"""Eigenvalue of what coefficients leave of columns of unit length, over the largest, below which it is rounding."""
+"""Singular value of the fitted columns, or eigenvalue of what they leave of others, over the largest, below which it is
+rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +50,9 @@ class FitEvidence:
     ----------
     z : (n,)
         White residuals, orthogonal to the fitted columns.
-    inverse : (n, n)
-        Of the root of the covariance, by which residuals are whitened.
+    inverse : (n, n) or None
+        Of the root of the covariance, by which residuals are whitened. None: columns are white, and rows behind those
+        of ``z`` act on the values alone.
     fitted : (n, r)
         Orthonormal basis of the fitted columns, whitened.
     gain : (p, n)
@@ -67,7 +65,7 @@ class FitEvidence:
     """
 
     z: Array
-    inverse: Array
+    inverse: Array | None
     fitted: Array
     gain: Array
     noise_dof: float
@@ -83,9 +81,13 @@ class FitEvidence:
         """Sum of squares of the white residuals."""
         return float(self.z @ self.z) + self.more[0]
 
+    def white(self, columns: Array) -> Array:
+        """Columns, whitened."""
+        return columns[: len(self.z)] if self.inverse is None else np.asarray(self.inverse @ columns)
+
     def beside(self, columns: Array) -> Array:
         """Columns (n, k) or (n,) less all that the fit takes up, whitened."""
-        white = self.inverse @ columns
+        white = self.white(columns)
         return np.asarray(white - self.fitted @ (self.fitted.T @ white))
 
     def ask(self, columns: Array) -> AskedError:
@@ -97,7 +99,7 @@ class FitEvidence:
         if not errors:
             return []
         columns = np.hstack(errors)
-        white = self.inverse @ columns
+        white = self.white(columns)
         length = np.linalg.norm(white, axis=0)
         length = np.where(length > 0.0, length, 1.0)
         left = white / length
@@ -199,7 +201,7 @@ def of_normal_equations(
     by = np.linalg.solve(root, scaled[:p, p:])
     rest = scaled[p:, p:] - by.T @ by
     values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
-    kept = values > _LOST * max(float(values[-1]), _LOST)
+    kept = values > _RANK * max(float(values[-1]), _RANK)
     length = np.sqrt(values[kept])
     score = size[p:] * g[p:] - by.T @ np.linalg.solve(root, size[:p] * g[:p])
     z = np.concatenate([np.zeros(p), vectors[:, kept].T @ score / length])
@@ -207,4 +209,4 @@ def of_normal_equations(
     n = len(z)
     gain = np.hstack([slope * size[:p] @ np.linalg.inv(root).T, np.zeros((len(slope), n - p))])
     more = max(squares - float(z @ z), 0.0), dof - (n - p)
-    return FitEvidence(z, np.eye(n), np.eye(n)[:, :p], gain, noise_dof, more), columns
+    return FitEvidence(z, None, np.eye(n)[:, :p], gain, noise_dof, more), columns

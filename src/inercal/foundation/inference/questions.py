@@ -40,7 +40,7 @@ class JudgedFit:
     by_value : (n, p) change of the readings by each value
     beside : (n, k) columns of all else that was fitted, or is known to be there
     readings, residuals : (n,) readings, and readings less model; unknowns whose prior is in ``covariance`` at its mean
-    covariance : (n, n) of the readings
+    covariance : (n, n) of the readings, or (n,) variances of those whose evidence is made elsewhere
     row, channel : (n,) numbers from 0, of the test's rows in the order of time and of the channels; a channel of -1 is
         none: a condition that is fitted like a reading
     time : (n,)
@@ -81,7 +81,8 @@ class JudgedFit:
     @property
     def ranging(self) -> NDArray[np.bool_]:
         """Channels (c,) whose predictions range over many times their noise, so that shapes of them mean something."""
-        sigma, y = np.sqrt(np.diag(self.covariance)), self.predicted
+        variance = self.covariance if self.covariance.ndim == 1 else np.diag(self.covariance)
+        sigma, y = np.sqrt(variance), self.predicted
         return np.array(
             [
                 bool(np.ptp(y[own]) > LIMITS.least_range * np.median(sigma[own]))

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
@@ -45,7 +46,7 @@ _FAMILIES = {
 _DIAGONAL = (0, 4, 8)
 
 _WALKING = ("drift", "bend", "sway")
-"""What biases do that walk."""
+"""Verbs of biases that walk."""
 
 
 class _Term(NamedTuple):
@@ -116,7 +117,7 @@ def _questions(fit: Fit, samples: Samples, settings: StrapdownSettings) -> Itera
     yield from _by_history(G, rate, force)
 
 
-def _means(x: Array, sample: Array) -> Array:
+def _means(x: Array, sample: NDArray[np.int64]) -> Array:
     """Means (k, 3) of samples (n, 3) from node to node."""
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])[sample]
     return np.asarray(np.diff(sums, axis=0) / np.diff(sample)[:, None])
@@ -161,7 +162,7 @@ def _by_order(fit: Fit, settings: StrapdownSettings) -> Iterator[Question]:
     middle = 0.5 * (fit.nodes.sample[1:] + fit.nodes.sample[:-1])
     walking = {"gyro_bias": settings.noise.gyro_walk > 0.0, "bias": settings.noise.accelerometer_walk > 0.0}
     G = fit.sensitivities
-    subjects = [
+    subjects: list[tuple[str, str, bool, Array]] = [
         (group, *_FAMILIES[group], G[:, :, list(GROUPS[group])]) for group in ALWAYS if group in _FAMILIES
     ]
     T = [KG.start + k for k in range(9)]
@@ -200,7 +201,7 @@ def _by_reading(G: Array, rate: Array, force: Array) -> Iterator[Question]:
             ("step", "where they change their sign", bias * np.sign(x)[:, None]),
         ):
             yield Question("reading", what, True, verb, rest, columns)
-            alike = sum(np.split(columns, columns.shape[2] // 3, axis=2)).sum(axis=2, keepdims=True)
+            alike = columns.sum(axis=2, keepdims=True)
             yield Question("reading", what, True, verb, f"{rest}, all alike", alike)
 
 

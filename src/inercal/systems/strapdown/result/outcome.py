@@ -20,7 +20,7 @@ from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
-from inercal.foundation.results.budget import TypeA, TypeB, combine
+from inercal.foundation.results.budget import TypeB, combine
 from inercal.foundation.results.remarks import at_prior_together, exact_gravity, singular
 from inercal.foundation.results.result import Estimate
 from inercal.systems.strapdown.fit.batch import Fit
@@ -39,7 +39,7 @@ from inercal.systems.strapdown.model.coefficients import (
 from inercal.systems.strapdown.model.samples import Samples, freed
 from inercal.systems.strapdown.noise.restricted import residuals
 from inercal.systems.strapdown.noise.unmodelled import TestedEffect, considered, posed, tests
-from inercal.systems.strapdown.result.budget import sources
+from inercal.systems.strapdown.result.budget import excess, sources
 from inercal.systems.strapdown.result.judged import judged_unit
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings
 
@@ -95,10 +95,6 @@ def assemble(
     prior_u = np.sqrt(np.sum(np.square(J * fit.prior), axis=1))
     parts = sources(fit, samples, settings, J)
     by_fit = np.sqrt(np.diag(J @ fit.covariance @ J.T))
-    misfit = _misfit(fit)
-    if 1.0 < misfit <= INFERENCE.gross:
-        more = (misfit**2 - 1.0) * (J @ fit.covariance @ J.T)
-        parts.append(TypeA("residuals beyond the stated noise", misfit, "1", more, float(fit.dof)))
     scales = np.array(
         [
             value if name.startswith("S_") and len(name) == 3 else 0.0
@@ -117,6 +113,7 @@ def assemble(
     findings = [*record.findings, *at_prior_together(at_prior)]
     findings += exact_gravity(settings.site, "its relative error goes into all K1")
     findings += _too_quiet(fit)
+    misfit = excess(fit)
     findings += _left_out(tested, found, J, fitted_u)
     if fit.converged and fit.chi2 > INFERENCE.noiseless**2 * fit.dof:
         findings += judged_unit(batch, samples, settings, found, J, fitted_u)
@@ -350,16 +347,9 @@ def _left_out(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, 
     ]
 
 
-def _misfit(fit: Fit) -> float:
-    """Residuals over the stated noise (rms), where they are larger by more than chance; else 1."""
-    from scipy.special import chdtri
-
-    return math.sqrt(fit.chi2 / fit.dof) if fit.chi2 > float(chdtri(fit.dof, LIMITS.risk)) else 1.0
-
-
 def _shown(best: TestedEffect, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
-    """The finding of an effect that the recording shows; it harms the values that it would shift by more than u."""
-    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), u)
+    """The finding of an effect that the recording shows; it harms the values that it would shift by more than 2 u."""
+    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), INFERENCE.harm * u)
     text = (
         f"the recording shows {candidate.words} (chi-square falls by {best.drop:.4g} for "
         f"{counted(len(candidate.prior), 'parameter')})"
@@ -386,7 +376,7 @@ def _verdict(
             f"after {fit.passes} passes the coefficients still move: check units, signs and the order of axes, and "
             "that the prior allows for what the unit is"
         )
-    if (misfit := _misfit(fit)) > INFERENCE.gross:
+    if (misfit := excess(fit)) > INFERENCE.gross:
         return Status.INCONSISTENT, (
             f"the recording contradicts model or noise by {misfit:.2g} times: residuals are "
             f"{statistics['turn_residual_rms']:.2g} times the noise over turns and "
