@@ -45,6 +45,8 @@ CODES: dict[str, Code] = {
     "file_changed": Code("a file was written to while it was read", _NEVER),
     "saturation": Code("a sensor sits at an extreme of its range", _BY_SIZE, rank=8),
     "dead_channel": Code("a channel never changes", _BY_SIZE, rank=6),
+    "no_data": Code("a stretch of a recording repeats one row", _BY_SIZE),
+    "held_samples": Code("each value stands for several rows", _NEVER),
     "rate_change": Code("the sample rate changes", _NEVER, rank=7),
     "other_clock": Code("channels have clocks of their own", _NEVER),
     "unit_suspect": Code("the values do not fit the stated unit", _BY_SIZE, rank=1, gross=True),
@@ -124,6 +126,7 @@ CODES: dict[str, Code] = {
         "readings depend on the sense in which a position is reached", _BY_SIZE, rank=22
     ),
     "ground_field": Code("outputs respond to a field that is fixed to the ground", _BY_SIZE, rank=23),
+    "blind": Code("what a plan cannot exclude, though it would shift a value", _NEVER),
     "weak_test": Code("faults that would shift a value and that the residuals would not show", _NEVER),
     "not_stated": Code("a file does not state what a calibration should", _BY_SIZE),
     "not_held": Code("something of a calibration is not taken along", _NEVER),

@@ -300,6 +300,9 @@ class Limits:
     hysteresis_probability: float = 0.01
     """Probability at which chance alone makes passes of any of the channels differ."""
 
+    judged_rows: int = 1000
+    """Rows of each sensor that are judged at most: those of longer records are summed."""
+
     # aided by a table: its diagnosis; shares of an output are of its variation over the test
 
     misfit_risk: float = 2.5e-5
@@ -316,9 +319,6 @@ class Limits:
 
     told_share: float = 1e-3
     """Share of a pattern that the other unknowns have to leave for it to be told from them."""
-
-    short_share: float = 0.01
-    """Share of the largest input by which an output has to fall short to be called saturated."""
 
     smoothing_step: float = 0.05
     """Step [s] of the second derivatives with time by which a slow filter is seen."""

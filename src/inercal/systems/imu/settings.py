@@ -17,7 +17,7 @@ from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, o
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.units import Quantity
 
-MASKED = ("saturation",)
+MASKED = ("saturation", "no_data")
 """Codes of a recording's findings whose samples no fit uses: turns in which a sensor saturates are left out."""
 
 COMMAND = "calibrate imu"

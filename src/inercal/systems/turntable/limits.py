@@ -118,16 +118,6 @@ class Limits:
     least_seen: float = 0.01
     """Part of a fault's effect outside the terms below which it does not show."""
 
-    scale_off: float = 0.1
-    """Part by which a scale factor whose two sides have one unit may differ from 1, and by u of its uncertainty from
-    what it can be."""
-
-    angle_off: float = 0.1
-    """Misalignment [rad] beyond which axes are exchanged, or the mounting is another one."""
-
-    range_off: float = 0.05
-    """Part by which a scale factor may differ from a power of two to be that of another range."""
-
     outside_zone: int = 2
     """Distinct inputs that are to lie beyond a dead zone on either side."""
 

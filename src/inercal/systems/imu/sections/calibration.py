@@ -12,6 +12,7 @@ from scipy.linalg import LinAlgError
 from scipy.special import chdtrc, stdtrit
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.inference.variances import degrees, second_moment, weighed
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
@@ -94,6 +95,8 @@ class SectionCalibration:
     linear: Linear
     z: Array
     """The linear problem at the point, and the likeliest logarithms (c,) of the scatters."""
+    widened: float = 1.0
+    """Factor on u for residuals that are larger than what is known explains."""
 
     @cached_property
     def outlying(self) -> Array:
@@ -101,6 +104,11 @@ class SectionCalibration:
         if not self.converged:
             return np.ones(len(self.problem.readings.sections))
         return outlying(self.linear, self.z, self.linear.at(self.z))
+
+    @property
+    def misfit(self) -> float:
+        """Residuals over what is known of them (rms)."""
+        return float(np.sqrt(self.chi2 / self.freedom)) if self.freedom > 0.0 else 1.0
 
     def value(self, name: str) -> tuple[float, float, float]:
         """Value, u and U of a coefficient."""
@@ -158,12 +166,30 @@ def calibrate_sections(
             continue
         if anew.converged and not contradicted(anew):
             return replace(anew, freed=other is free)
-    return found
+    return _widened(found)
+
+
+def _widened(found: SectionCalibration) -> SectionCalibration:
+    """The calibration with u as much larger as its residuals are, where these are not so large that nothing can be
+    used."""
+    if gross(found):
+        return found
+    times = found.misfit
+    return replace(
+        found, u=times * found.u, U=times * found.U, covariance=times**2 * found.covariance, widened=times
+    )
 
 
 def _freed(scale: Size | None) -> Size | None:
     """A prior of scale factors that says nothing but the unit."""
     return None if scale is None else scale._replace(spread=np.inf)
+
+
+def gross(found: SectionCalibration) -> bool:
+    """True where sections contradict what is said of them so much that nothing can be used."""
+    return contradicted(found) and (
+        found.misfit > INFERENCE.gross or max(found.beyond.values(), default=0.0) > LIMITS.beyond_scatter
+    )
 
 
 def contradicted(found: SectionCalibration) -> bool:
@@ -288,7 +314,7 @@ def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
     covariances = np.array([(each.covariance + curved.covariance)[:count, :count] for each in found])
     mean = weights @ shifts
     covariance = second_moment(weights, covariances, shifts - mean)
-    J, value = _in_outputs(names, x, x[at] + mean)
+    J, value = in_outputs(names, x, x[at] + mean)
     variances = np.einsum("ij,gjk,ik->gi", J, covariances, J)
     covariance = J @ covariance @ J.T
     U = half_widths(weights, (shifts - mean) @ J.T, np.sqrt(variances))
@@ -363,7 +389,7 @@ def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowS
     return out
 
 
-def _in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:
+def in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:
     """Derivatives (p, p) of the coefficients by their ``values`` (p,) in the fit, and the coefficients: G is carried as
     a rate, of which outputs see S times as much. S that is not fitted is that of the unknowns ``x``."""
     J, out = np.eye(len(names)), values.copy()

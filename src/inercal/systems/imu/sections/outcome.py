@@ -25,6 +25,7 @@ from inercal.foundation.units import RAW, Quantity
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
+from inercal.systems.imu.sections.clocks import two_clocks
 from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
@@ -134,6 +135,7 @@ def calibrate_from_sections(
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
+    findings = (*findings, *findings_of(found, priors), *two_clocks(found, named))
     if isinstance(options, KnownRatesSettings):
         findings = (*findings, *trend_findings(found))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
@@ -317,7 +319,7 @@ def _estimate(
         found.x,
         Uncertainty(found.covariance, found.dof, budget),
         verdict(found, proposal.questions),
-        findings=(*findings, *findings_of(found)),
+        findings=findings,
         statistics={
             "dof": found.freedom,
             "chi2": found.chi2,

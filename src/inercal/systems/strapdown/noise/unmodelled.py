@@ -229,27 +229,35 @@ class Posed(NamedTuple):
 def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
     """The normal equations of a fit and of all that it may have left out."""
     tried = list(_candidates(fit, settings))
-    m, p = fit.chain.F.shape[1], len(fit.free)
+    p = len(fit.free)
     none = np.empty((len(fit.chain.G), 6, 0))
-    more = np.concatenate([none, *(each.columns for each in tried)], axis=2)
-    columns = np.pad(more, ((0, 0), (0, m - 6), (0, 0)))
+    columns = np.concatenate([none, *(each.columns for each in tried)], axis=2)
     prior = np.concatenate([np.empty(0), *(each.prior for each in tried)])
-    chain = fit.chain._replace(
-        G=np.ascontiguousarray(np.concatenate([fit.chain.G, columns], axis=2)),
-        prior=np.concatenate([fit.chain.prior, prior**-2]),
-        c=np.concatenate([fit.chain.c, np.zeros(len(prior))]),
-    )
-    n, count = 2 * m + 3 + p + len(prior), len(chain.rest)
-    H, g = np.empty((n, n)), np.empty(n)
-    forward(chain, H, g, np.empty((count, m + 3, n)), np.empty((count, m + 3)))
+    H, g = eliminated(fit, columns, prior**-2)
     size = np.concatenate([fit.prior, prior])
-    upper = np.triu(H[2 * m + 3 :, 2 * m + 3 :])
     ends = np.cumsum([len(each.prior) for each in tried])
     places = [
         p + np.arange(end - len(each.prior), end) for each, end in zip(tried, ends.tolist(), strict=True)
     ]
-    scaled = (upper + np.triu(upper, 1).T) * np.outer(size, size)
-    return Posed(tried, places, scaled, g[2 * m + 3 :] * size, fit.prior)
+    return Posed(tried, places, H * np.outer(size, size), g * size, fit.prior)
+
+
+def eliminated(fit: Fit, columns: Array, information: Array) -> tuple[Array, Array]:
+    """Normal equations (p + q, p + q), (p + q,) of the coefficients of a fit and of more ``columns`` (k, 6, q) of its
+    intervals, whose sizes are 0 with so much ``information`` (q,), the nodes eliminated."""
+    m, p, q = fit.chain.F.shape[1], len(fit.free), columns.shape[2]
+    chain = fit.chain._replace(
+        G=np.ascontiguousarray(
+            np.concatenate([fit.chain.G, np.pad(columns, ((0, 0), (0, m - 6), (0, 0)))], axis=2)
+        ),
+        prior=np.concatenate([fit.chain.prior, information]),
+        c=np.concatenate([fit.chain.c, np.zeros(q)]),
+    )
+    n, count = 2 * m + 3 + p + q, len(chain.rest)
+    H, g = np.empty((n, n)), np.empty(n)
+    forward(chain, H, g, np.empty((count, m + 3, n)), np.empty((count, m + 3)))
+    upper = np.triu(H[2 * m + 3 :, 2 * m + 3 :])
+    return upper + np.triu(upper, 1).T, g[2 * m + 3 :]
 
 
 def tests(problem: Posed) -> list[TestedEffect]:

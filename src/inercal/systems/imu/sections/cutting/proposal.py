@@ -10,6 +10,7 @@ import numpy as np
 
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.records.checks.stretches import erased
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
@@ -313,7 +314,8 @@ def _samples(record: Record, sensor: str) -> TriadSamples | None:
     if all(f"{sensor}_{axis}" in record for axis in "xyz"):
         triad = record.triad(sensor)
         clipped = np.any([at_ends(values) for values in triad.values.T], axis=0)
-        return TriadSamples(triad.t, triad.values, np.asarray(clipped))
+        values = np.where(erased(triad.values)[:, None], np.nan, triad.values)
+        return TriadSamples(triad.t, values, np.asarray(clipped))
     return None
 
 
