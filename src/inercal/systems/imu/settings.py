@@ -124,12 +124,18 @@ class SectionsSettings:
         Tables ``[[imu.section]]`` of the study, as typed.
     placing, level
         As their keys say [rad].
+    misalignment : float or None
+        Standard deviation of M and T about 0 [rad]; as usual if absent.
+    mounting_u : float
+        Standard uncertainty of the case against directions and axes [rad].
     """
 
     table: Path | None = None
     rows: tuple[Mapping[str, object], ...] = ()
     placing: float | None = None
     level: float | None = None
+    misalignment: float | None = None
+    mounting_u: float = 0.0
 
 
 Method: TypeAlias = (
@@ -230,6 +236,8 @@ class ImuSettings:
         Local gravity and what it is uncertain by.
     static_start, g_sensitivity, bias_drift, time_base_u
         As their keys say.
+    g_sensitivity_u : float or None
+        Of sections: its standard deviation about 0 [(rad/s)/(m/s^2)]; as usual for such gyros if absent.
     k2 : bool
         Second-order coefficients of the accelerometers are estimated.
     k2_u : float or None
@@ -256,8 +264,9 @@ class ImuSettings:
     g_sensitivity: bool = option(
         "also estimate how the gyro's drift depends on specific force",
         False,
-        kinds=("multiposition", "aided"),
+        kinds=("multiposition", "aided", "sections"),
     )
+    g_sensitivity_u: float | None = None
     bias_drift: bool = option(
         "also estimate how the gyro's bias drifts with time", False, kinds=("multiposition",)
     )

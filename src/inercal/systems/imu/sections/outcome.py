@@ -116,15 +116,26 @@ def calibrate_from_sections(
     return CalibrationFromSections(timed(estimate, clock), sections, found)
 
 
-def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
-    """Priors by what the study says of the site, the clock and the instrument."""
-    return Priors(
-        settings.site,
+def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> Priors:
+    """Priors by what the study says of the site, the clock and the instrument; ``scales`` of the scale factors of
+    ``acc`` and ``gyro``."""
+    usual = Priors(settings.site)
+    options = settings.method if isinstance(settings.method, SectionsSettings) else SectionsSettings()
+    return replace(
+        usual,
         clock_u=settings.time_base_u,
-        acc_scale=_scale(units["acc"]),
-        gyro_scale=_scale(units["gyro"]),
+        mounting_u=options.mounting_u,
+        acc_scale=scales["acc"],
+        gyro_scale=scales["gyro"],
+        misalignment=usual.misalignment if options.misalignment is None else options.misalignment,
         k2=math.inf if settings.k2 else settings.k2_u,
+        g_sensitivity=settings.g_sensitivity_u,
     )
+
+
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
+    """Priors by the study and the units of the outputs."""
+    return stated_priors(settings, {sensor: _scale(triad) for sensor, triad in units.items()})
 
 
 def _by_swing(
