@@ -146,7 +146,7 @@ def test_too_few_rests_name_the_pose_to_add(unit):
     ]  # x and y up and down, never z
     found = missing(sections, Priors(site(unit)))
     assert found is not None
-    assert "z" in found.pose or found.terms
+    assert "z" in found.cure or found.terms
     for section in sections:
         assert section.up is None
     assert missing(poses(Bench(unit), 12), Priors(site(unit))) is None

@@ -1,4 +1,4 @@
-"""Sections that are missing where those there leave a coefficient open, and the rest to add."""
+"""Sections that are missing where those there leave a coefficient open, and the one to add."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from inercal.systems.imu.sections.arrow import Linear
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.priors import Priors
-from inercal.systems.imu.sections.problem import Extra, Problem, problem_of
+from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.start import first_guess
 from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, K1, G, S
 
 
 class Missing(NamedTuple):
-    """Coefficients that stay open, by name, and in words a direction of specific force that tells most of them; empty
-    where they are the gyro's, which needs a rest in any pose."""
+    """Coefficients that stay open, by name, and in words the section to add: a rest in the direction of specific force
+    that tells most of them, a turn, or of a gyro's bias a rest in any."""
 
     terms: tuple[str, ...]
-    pose: str
+    cure: str
 
 
 def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...] = ()) -> Missing | None:
@@ -35,7 +35,9 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     if not terms:
         return None
     if all(name.startswith("D_F") for name in terms):
-        return Missing(terms, "")
+        return Missing(terms, "a rest")
+    if axes := [name[-1] for name in terms if name.startswith("S_")]:
+        return Missing(terms, f"a turn by a known angle about {' and about '.join(axes)}")
     told = any(s.kind == "rest" and s.up is not None for s in sections)
     x = first_guess(problem_of(sections, priors, extras)).x
     best, pose = np.inf, np.array([0.0, 0.0, 1.0])
@@ -48,7 +50,7 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
             worst = max(there[name] for name in terms)
             if worst < (1.0 - 1e-6) * best:
                 best, pose = worst, up
-    return Missing(terms, pose_words(pose))
+    return Missing(terms, f"a rest with {pose_words(pose)} up")
 
 
 def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> dict[str, float]:
@@ -64,17 +66,18 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     flat = [
         k for k, p in enumerate(linear.shared) if p < len(COEFFICIENTS) and not np.isfinite(problem.sd[p])
     ]
-    size = np.array([LIMITS.open_share * _full_scale(problem, int(linear.shared[k])) for k in flat])
+    size = np.array([LIMITS.open_share * _full_scale(problem, point, int(linear.shared[k])) for k in flat])
     u = np.sqrt(np.abs(np.diag(covariance)[flat]))
     return {COEFFICIENTS[linear.shared[k]]: float(part) for k, part in zip(flat, u / size, strict=True)}
 
 
-def _full_scale(problem: Problem, p: int) -> float:
-    """The largest output of the triad of a bias, that by g-sensitivity among them; 1 for any other coefficient."""
+def _full_scale(problem: Problem, point: Iterate, p: int) -> float:
+    """The largest output of the triad of a bias, that by g-sensitivity among them; a scale factor itself; 1 for any
+    other coefficient."""
     name, y = COEFFICIENTS[p], problem.readings.y
     if name.startswith("K0"):
         return float(np.nanmax(np.abs(y[:, :2])))
     if name.startswith("D_F"):
         drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
         return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)
-    return 1.0
+    return abs(float(point.x[p])) if name.startswith(("K1", "S")) else 1.0

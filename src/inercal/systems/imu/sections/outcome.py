@@ -28,7 +28,7 @@ from inercal.systems.imu.sections.calibration import SectionCalibration, calibra
 from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
-from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
+from inercal.systems.imu.sections.cutting.table import stated_rows
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
@@ -79,7 +79,7 @@ def calibrate_from_sections(
     refuse_samples(named)
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     proposal = _proposal(named, options)
-    sections = tuple(_placed(section, options) for section in proposal.sections)
+    sections = tuple(placed(section, options) for section in proposal.sections)
     findings = (*_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
     bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
@@ -97,8 +97,7 @@ def calibrate_from_sections(
     lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
-        cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
-        text = f"the sections leave {what} open: add {cure}"
+        text = f"the sections leave {what} open: add {lacking.cure}"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     progress("fitting the sections")
@@ -236,15 +235,11 @@ def _scale(triad: Triad | None) -> Size | None:
 
 def _proposal(named: Mapping[str, Record], options: SectionsSettings) -> Proposal:
     """The sections that the study states, or that recordings tell."""
-    rows: tuple[SectionRow, ...] = ()
-    if options.table is not None:
-        rows = read_table(options.table)
-    elif options.rows:
-        rows = of_tables(options.rows)
+    rows = stated_rows(options)
     return Proposal.by(rows, named) if rows else Proposal.of(named)
 
 
-def _placed(section: Section, options: SectionsSettings) -> Section:
+def placed(section: Section, options: SectionsSettings) -> Section:
     """The section with the placing and level of all where it states none."""
     turning = section.kind in ("rate", "turn")
     return replace(
