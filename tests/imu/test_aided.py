@@ -11,7 +11,7 @@ import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth, one_calibration
 
 from inercal.faces.report.html import render
-from inercal.faces.studies.imu import AidedTable, aided_settings
+from inercal.faces.studies.aided import AidedTable, aided_settings
 from inercal.foundation._toml import check
 from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import RecordError, StudyError

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth
 
-from inercal.faces.studies.imu import AidedTable
+from inercal.faces.studies.aided import AidedTable
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status

@@ -120,11 +120,11 @@ def test_a_study_states_course_truth_and_disturbances(tmp_path):
         ),
         (
             STUDY + '[imu]\nmethod = "ferraris"\n[simulation]\nposes = 9\n',
-            "simulation.poses: found with method = 'ferraris', expected it with multiposition only",
+            "simulation.poses: found with method = 'ferraris', expected it with multiposition or sections only",
         ),
         (
             STUDY + '[imu]\nmethod = "aided"\n[disturbances]\nrestless_start = "1 deg"\n',
-            "expected it with multiposition or ferraris only",
+            "expected it with multiposition or ferraris or sections only",
         ),
     ):
         path.write_text(text)

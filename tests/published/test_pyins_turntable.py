@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from inercal.examples import FOLDER
-from inercal.faces.studies.imu import AidedTable, aided_settings
+from inercal.faces.studies.aided import AidedTable, aided_settings
 from inercal.faces.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError

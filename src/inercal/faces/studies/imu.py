@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from inercal.faces.studies.aided import AidedTable, aided_settings
 from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.rig import RigTable, chain_of
 from inercal.faces.studies.tables import check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
@@ -27,7 +27,6 @@ from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.imu.settings import (
     TILT,
     TURN,
-    AidedSettings,
     Disturbances,
     Exclusion,
     ImuSettings,
@@ -37,53 +36,7 @@ from inercal.systems.imu.settings import (
     Method,
     SectionsSettings,
     Simulation,
-    mounting_of,
 )
-
-SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-
-
-class AidedTable(Strict):
-    """Reference-aided calibration: the table, and the instrument on it."""
-
-    rig: RigTable = Field(
-        default=RigTable(kind="two_axis_turntable"),
-        title="Rig",
-        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
-        "its azimuth unknown unless given",
-    )
-    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
-        default=("+x", "+y", "+z"),
-        examples=[["+x", "+y", "+z"]],
-        description="axes of the table, at zero angles, along which the instrument's x, y and z point",
-    )
-
-    @model_validator(mode="after")
-    def _right_handed(self) -> AidedTable:
-        """Refuse axes that make no frame."""
-        if mounting_of(self.mounting) is None:
-            raise refusal(
-                f"found the mounting {', '.join(self.mounting)}, expected three axes that make a right-handed frame"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _no_limits(self) -> AidedTable:
-        """Refuse what would change nothing."""
-        if self.rig.limits.model_fields_set:
-            raise refusal("found rig.limits, expected none: the angles are those of the record")
-        return self
-
-
-def aided_settings(table: AidedTable, where: object) -> AidedSettings:
-    """Put the table in SI.
-
-    Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
-    """
-    azimuth = table.rig.base.azimuth
-    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
-    return AidedSettings(chain, None if azimuth is None else azimuth.u)
-
 
 #: keys beside those of the settings that not all methods heed -> those that do
 _METHODS = {
@@ -93,6 +46,9 @@ _METHODS = {
     "section": ("sections",),
     "placing": ("sections",),
     "level": ("sections",),
+    "misalignment": ("sections",),
+    "mounting": ("sections",),
+    "clock": ("sections",),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
     "alignment": ("known_turns",),
@@ -123,6 +79,17 @@ def exclusion_of(texts: list[str]) -> Exclusion:
     ends = [text.split("..") for text in texts if ".." in text]
     times = tuple((seconds_of(begin.strip()), seconds_of(end.strip())) for begin, end in ends)
     return Exclusion(times, poses)
+
+
+Prior = Annotated[
+    Any, WithJsonSchema({"type": "string", "pattern": r"^\s*0", "examples": ["0(0.05) deg/s/g"]})
+]
+"""0 with a standard uncertainty, in a unit that depends on the term."""
+
+
+def _about_zero(dimension: str, example: str) -> QuantityText:
+    """The reader of a prior: 0 with its standard uncertainty."""
+    return QuantityText(dimension, example, lambda value: value == 0.0, "0 with its standard uncertainty")
 
 
 Rate = Annotated[Quantity, QuantityText("rate", "33.333(15) rpm")]
@@ -171,6 +138,24 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default=None,
         description="of sections: the axes of turns and rates are vertical within this; not known if absent",
     )
+    misalignment: Annotated[Quantity, _about_zero("angle", "0(50) mrad")] | None = Field(
+        default=None, description="of sections: what M and T are before the test; 0(50) mrad if absent"
+    )
+    mounting: Annotated[Quantity, _about_zero("angle", "0(0.5) deg")] | None = Field(
+        default=None,
+        description="of sections: rotation of the case against what is said of directions and axes; 0 if absent",
+    )
+    clock: Annotated[Quantity, _about_zero("number", "0(20) ppm")] | None = Field(
+        default=None,
+        description="of sections: relative error of the record's clock, in the place of time_base",
+    )
+    g_sensitivity: bool | Prior = Field(
+        default=False,
+        description="how the gyro's drift depends on specific force: true to estimate it too; of sections, where it is "
+        "estimated unless false, 0 with the standard uncertainty it has before the test, by default 0.1 deg/s/g, of "
+        "gyros for navigation 0.1 deg/h/g",
+        examples=["0(0.05) deg/s/g"],
+    )
     rates: list[Rate] = Field(
         default=[],
         examples=[["0 rpm", "33.333(15) rpm", "45.00(2) rpm"]],
@@ -215,6 +200,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         check_kind(ImuSettings, self, self.method, "method")
         if self.sections is not None and self.section:
             raise refusal("found beside sections, expected one of the two", "section")
+        if self.clock is not None and "time_base" in self.model_fields_set:
+            raise refusal("found beside time_base, expected one of the two", "clock")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
@@ -286,13 +273,18 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
                 tuple(table.section),
                 None if table.placing is None else table.placing.value,
                 None if table.level is None else table.level.value,
+                None if table.misalignment is None else table.misalignment.u,
+                0.0 if table.mounting is None else table.mounting.u,
             )
     return None
 
 
 def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
-    """True where K2 is estimated, and its standard deviation about 0 [1/(m/s^2)] where that is stated."""
+    """True where K2 is estimated without a prior, and its standard deviation about 0 [1/(m/s^2)] where that is
+    stated."""
     if isinstance(table.k2, bool):
+        if table.method == "sections":
+            return False, 0.0 if "k2" in table.model_fields_set and not table.k2 else None
         if table.k2 and table.method == "ferraris":
             raise StudyError(
                 path,
@@ -302,13 +294,32 @@ def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float 
         return table.k2, None
     if table.method == "aided":
         raise StudyError(path, "imu.k2: found an uncertainty with method = 'aided', expected true or false")
-    value, u = coefficient_of(table.k2, "K2_x", "accelerometer", parse_unit("count"), gravity, "imu.k2", path)
+    return False, _u_about_zero(table.k2, "K2_x", "imu.k2", "0(50) ug/g^2", gravity, path)
+
+
+def _g_sensitivity(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
+    """True where it is estimated without a prior, and of sections its standard deviation about 0
+    [(rad/s)/(m/s^2)] where that is stated, 0 where there is none."""
+    if isinstance(table.g_sensitivity, bool):
+        unsaid = table.g_sensitivity or "g_sensitivity" not in table.model_fields_set
+        return table.g_sensitivity, None if unsaid else 0.0
+    if table.method != "sections":
+        found = f"imu.g_sensitivity: found {shown(table.g_sensitivity)}"
+        raise StudyError(path, f"{found}, expected true or false with method = {table.method!r}")
+    key, example = "imu.g_sensitivity", "0(0.05) deg/s/g"
+    return True, _u_about_zero(table.g_sensitivity, "G_xx", key, example, gravity, path)
+
+
+def _u_about_zero(
+    text: object, symbol: str, key: str, example: str, gravity: float, path: str | Path
+) -> float:
+    """Standard deviation [SI] of a term about 0."""
+    kind, unit = ("accelerometer", "count") if symbol.startswith("K") else ("gyro", "rad/s")
+    value, u = coefficient_of(text, symbol, kind, parse_unit(unit), gravity, key, path)
     if value != 0.0:
-        raise StudyError(
-            path,
-            f'imu.k2: found {shown(table.k2)}, expected true or 0 with an uncertainty, such as "0(50) ug/g^2"',
-        )
-    return False, u
+        expected = f'expected true, false or 0 with an uncertainty, such as "{example}"'
+        raise StudyError(path, f"{key}: found {shown(text)}, {expected}")
+    return u
 
 
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
@@ -335,11 +346,16 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
             other.k2, "K2_x", "accelerometer", count, site.gravity, "disturbances.k2", path
         )
     fitted, k2_u = _k2(file.imu, site.gravity, path)
+    with_g, g_u = _g_sensitivity(file.imu, site.gravity, path)
+    of_clock = {} if file.imu.clock is None else {"time_base_u": file.imu.clock.u}
     return settings_of(
         ImuSettings,
         file.imu,
         k2=fitted,
         k2_u=k2_u,
+        g_sensitivity=with_g,
+        g_sensitivity_u=g_u,
+        **of_clock,
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),

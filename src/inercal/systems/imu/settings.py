@@ -130,12 +130,18 @@ class SectionsSettings:
         Tables ``[[imu.section]]`` of the study, as typed.
     placing, level
         As their keys say [rad].
+    misalignment : float or None
+        Standard deviation of M and T about 0 [rad]; as usual if absent.
+    mounting_u : float
+        Standard uncertainty of the case against directions and axes [rad].
     """
 
     table: Path | None = None
     rows: tuple[Mapping[str, object], ...] = ()
     placing: float | None = None
     level: float | None = None
+    misalignment: float | None = None
+    mounting_u: float = 0.0
 
 
 Method: TypeAlias = (
@@ -151,25 +157,30 @@ Method: TypeAlias = (
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table.
+    """A simulated recording: sections one after the other, by hand from pose to pose, or on a table.
 
     Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
     """
 
     poses: int = option(
-        "of multiposition: held one after the other, the first level", 24, least=4, most=1000,
-        kinds=("multiposition",),
+        "of multiposition, and of sections that nothing states: held one after the other, the first level", 24,
+        least=4, most=1000, kinds=("multiposition", "sections"),
     )  # fmt: skip
     start: float = quantity(
         "length of the first hold, or rest of the table",
         "time",
         "30 s",
         bounds=TIME,
-        kinds=("multiposition", "aided"),
+        kinds=("multiposition", "aided", "sections"),
     )
     hold: float = quantity("length of each other hold, position or rest", "time", "3 s", bounds=TIME)
     turning: float = quantity("length of each turn; of the table, by 90 deg", "time", "3 s", bounds=TIME)
     sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
+    means: bool = option(
+        "of sections that are rests: a row of mean outputs for each in the place of samples",
+        False,
+        kinds=("sections",),
+    )
     accelerometer_noise: float = quantity(
         "white noise of the accelerometers", "velocity random walk", "80 ug/sqrt(Hz)", bounds=NOT_NEGATIVE
     )
@@ -191,7 +202,7 @@ class Disturbances:
 
     restless_start: float = quantity(
         "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
-        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE, kinds=("multiposition", "ferraris"),
+        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE, kinds=("multiposition", "ferraris", "sections"),
     )  # fmt: skip
     knocks: int = option("turns in which the instrument is knocked", 0, least=0, most=1000)
     knock: float = quantity("angle by which the gyro is wrong after a knock", "angle", "1 deg")
@@ -203,8 +214,9 @@ class Disturbances:
         bounds=within(-0.5, 0.5, "within 50 %"),
     )  # fmt: skip
     lever_arm: float = quantity(
-        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes", "length",
-        "0 mm", example="50 mm", bounds=NOT_NEGATIVE, kinds=("aided",),
+        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes; of sections "
+        "that of all of them beside the axis", "length", "0 mm", example="50 mm", bounds=NOT_NEGATIVE,
+        kinds=("aided", "sections"),
     )  # fmt: skip
     delay: float = quantity(
         "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms",
@@ -236,6 +248,8 @@ class ImuSettings:
         Local gravity and what it is uncertain by.
     static_start, g_sensitivity, bias_drift, time_base_u
         As their keys say.
+    g_sensitivity_u : float or None
+        Of sections: its standard deviation about 0 [(rad/s)/(m/s^2)]; as usual for such gyros if absent.
     k2 : bool
         Second-order coefficients of the accelerometers are estimated.
     k2_u : float or None
@@ -262,8 +276,9 @@ class ImuSettings:
     g_sensitivity: bool = option(
         "also estimate how the gyro's drift depends on specific force",
         False,
-        kinds=("multiposition", "aided"),
+        kinds=("multiposition", "aided", "sections"),
     )
+    g_sensitivity_u: float | None = None
     bias_drift: bool = option(
         "also estimate how the gyro's bias drifts with time", False, kinds=("multiposition",)
     )

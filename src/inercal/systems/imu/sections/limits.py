@@ -27,6 +27,9 @@ class Limits:
     beyond_scatter: float = 3.0
     """Logarithm of a scatter over its median beforehand, in standard deviations, beyond which no instrument has it."""
 
+    flat_scatter: float = 5.0
+    """Standard deviation of the logarithm of a scatter, in counts that nothing tells the unit of, about 1 count."""
+
     fewest_scatter_dof: float = 3.0
     """Degrees of freedom of a scatter below which it is rather what was known of it than found."""
 

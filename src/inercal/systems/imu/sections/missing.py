@@ -1,4 +1,4 @@
-"""Sections that are missing where those there leave a coefficient open, and the rest to add."""
+"""Sections that are missing where those there leave a coefficient open, and the one to add."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, K1, G, S
 
 
 class Missing(NamedTuple):
-    """Coefficients that stay open, by name, and in words the section that tells most of them."""
+    """Coefficients that stay open, by name, and in words the section to add: a rest in the direction of specific force
+    that tells most of them, a turn, or of a gyro's bias a rest in any."""
 
     terms: tuple[str, ...]
     cure: str
@@ -38,9 +39,8 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
         return None
     if all(name.startswith("D_F") for name in terms):
         return Missing(terms, "a rest")
-    if all(name.startswith(("D_F", "S_")) for name in terms):
-        axes = [name[-1] for name in terms if name.startswith("S_")]
-        return Missing(terms, f"a rate or turn about {counted_names(axes)}")
+    if axes := [name[-1] for name in terms if name.startswith("S_")]:
+        return Missing(terms, f"a rate, or a turn by a known angle, about {counted_names(axes)}")
     told = any(s.kind == "rest" and s.up is not None for s in sections)
     x = first_guess(problem_of(sections, priors, extras)).x
     best, pose = np.inf, np.array([0.0, 0.0, 1.0])

@@ -29,7 +29,7 @@ from inercal.systems.imu.sections.clocks import two_clocks
 from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
-from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
+from inercal.systems.imu.sections.cutting.table import stated_rows
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
@@ -89,7 +89,7 @@ def calibrate_from_sections(
     if isinstance(options, SectionsSettings):
         refuse_samples(named)
         proposal = _proposal(named, options)
-        sections = tuple(_placed(section, options) for section in proposal.sections)
+        sections = tuple(placed(section, options) for section in proposal.sections)
         method, notes = "sections", proposal.notes
     else:
         named = {name: alone(record, options) for name, record in named.items()}
@@ -143,15 +143,26 @@ def calibrate_from_sections(
     return CalibrationFromSections(timed(estimate, clock), sections, found)
 
 
-def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
-    """Priors by what the study says of the site, the clock and the instrument."""
-    return Priors(
-        settings.site,
+def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> Priors:
+    """Priors by what the study says of the site, the clock and the instrument; ``scales`` of the scale factors of
+    ``acc`` and ``gyro``."""
+    usual = Priors(settings.site)
+    options = settings.method if isinstance(settings.method, SectionsSettings) else SectionsSettings()
+    return replace(
+        usual,
         clock_u=settings.time_base_u,
-        acc_scale=_scale(units["acc"]),
-        gyro_scale=_scale(units["gyro"]),
+        mounting_u=options.mounting_u,
+        acc_scale=scales["acc"],
+        gyro_scale=scales["gyro"],
+        misalignment=usual.misalignment if options.misalignment is None else options.misalignment,
         k2=math.inf if settings.k2 else settings.k2_u,
+        g_sensitivity=settings.g_sensitivity_u,
     )
+
+
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
+    """Priors by the study and the units of the outputs."""
+    return stated_priors(settings, {sensor: _scale(triad) for sensor, triad in units.items()})
 
 
 def _by_swing(
@@ -252,15 +263,11 @@ def _scale(triad: Triad | None) -> Size | None:
 
 def _proposal(named: Mapping[str, Record], options: SectionsSettings) -> Proposal:
     """The sections that the study states, or that recordings tell."""
-    rows: tuple[SectionRow, ...] = ()
-    if options.table is not None:
-        rows = read_table(options.table)
-    elif options.rows:
-        rows = of_tables(options.rows)
+    rows = stated_rows(options)
     return Proposal.by(rows, named) if rows else Proposal.of(named)
 
 
-def _placed(section: Section, options: SectionsSettings) -> Section:
+def placed(section: Section, options: SectionsSettings) -> Section:
     """The section with the placing and level of all where it states none."""
     turning = section.kind in ("rate", "turn")
     return replace(

@@ -204,6 +204,10 @@ def problem_of(sections: Sequence[Section], priors: Priors, extras: tuple[Extra,
     for extra in extras:
         runs = np.where(extra.runs >= 0, first + extra.runs, runs)
         first += len(extra.labels)
+    if priors.gyro_scale is None and not np.any(
+        shared.sd[S] > 0.0
+    ):  # outputs of a gyro whose unit nothing tells
+        priors = replace(priors, gyro_scatter=Size(1.0, LIMITS.flat_scatter))
     on, sizes = _scatters(readings, priors)
     local, placed = _local(readings, priors, bool(np.any(shared.sd[S] > 0.0)), runs)
     if placed.any():

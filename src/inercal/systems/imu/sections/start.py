@@ -47,7 +47,10 @@ def first_guess(problem: Problem) -> Iterate:
             # poses need not reach both ends of an axis: a gain that the unit tells is better known
             near = scale is not None and np.all(by_range < 1.5 * abs(typical))
             x[gain] = (by_range if moving and not near else typical) / full
-        x[gain], x[bias] = np.where(there, x[gain], 1.0), np.where(there, x[bias], 0.0)
+        fitted = there & (
+            problem.sd[gain] > 0.0
+        )  # no range of outputs tells the scale of a gyro that never turned
+        x[gain], x[bias] = np.where(fitted, x[gain], problem.mean[gain]), np.where(there, x[bias], 0.0)
         way = (y - x[bias]) / x[gain] * np.where(size[used] < 0.0, -1.0, 1.0)[:, None]
         size_of = np.linalg.norm(way, axis=1, keepdims=True)
         way = np.where(size_of > 0.0, way / np.where(size_of > 0.0, size_of, 1.0), [0.0, 0.0, 1.0])

@@ -103,7 +103,7 @@ class Proposal:
         """
         files = {name: RecordedTriads.of(name, record) for name, record in records.items()}
         only = next(iter(files)) if len(files) == 1 else ""
-        rows = [replace(row, file=row.file or only) for row in rows]
+        rows = [_by_label(replace(row, file=row.file or only), files) for row in rows]
         for row in rows:
             if row.file not in files:
                 raise StudyError(
@@ -276,6 +276,35 @@ def _of_claim(said: Claim, name: str, file: str, why: str) -> SectionRow:
         angle=None if said.angle is None else quantity_of(said.angle, 0.0, "deg"),
         why=why if said.kind != "turn" or said.angle is not None else f"{why}: which angle?",
     )  # fmt: skip
+
+
+def _by_label(row: SectionRow, files: Mapping[str, RecordedTriads]) -> SectionRow:
+    """The row with the stretch of the label that is its name, where it states no times or is of a file that is not
+    there.
+
+    Raises `StudyError` where it states others.
+    """
+    for name, file in files.items():
+        clock = file.acc or file.gyro
+        assert clock is not None
+        labels = file.record.labels
+        if (
+            len(labels) != len(clock.t)
+            or (row.file in files and row.file != name)
+            or row.section not in labels
+        ):
+            continue
+        t = clock.t[np.array(labels) == row.section]
+        begin, end = float(np.nanmin(t)), float(np.nanmax(t))
+        if row.file not in files or (row.begin is None and row.end is None):
+            return replace(row, file=name, begin=begin, end=end)
+        if (row.begin or -np.inf) > end or (row.end or np.inf) < begin:
+            raise StudyError(
+                f"section {row.section}",
+                f"found the label {row.section} from {begin:.2f} s to {end:.2f} s of {name}, outside its begin and "
+                "end, expected one of the two: leave begin and end blank, or rename it",
+            )
+    return row
 
 
 def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:

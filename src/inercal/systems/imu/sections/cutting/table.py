@@ -20,6 +20,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.units import Quantity, parse_quantity, parse_unit, shown
 from inercal.systems.imu.sections.section import Kind
+from inercal.systems.imu.settings import SectionsSettings
 
 RowKind = Literal[Kind, "move", "swing"]
 
@@ -67,6 +68,14 @@ COLUMNS = tuple(field.name for field in fields(SectionRow))
 
 _WRITTEN = ("section", "file", "begin", "end", "kind", "up", "axis", "rate", "angle", "setup")
 """Columns that are written also where no row says anything."""
+
+
+def stated_rows(options: SectionsSettings) -> tuple[SectionRow, ...]:
+    """The rows that a study states, in a table or by itself; none where names and recordings are to tell them.
+
+    Raises `StudyError`.
+    """
+    return read_table(options.table) if options.table is not None else of_tables(options.rows)
 
 
 def read_table(path: str | Path) -> tuple[SectionRow, ...]:
