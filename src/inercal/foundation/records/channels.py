@@ -45,7 +45,8 @@ Origin = int | str | tuple[str, int]
 class Channel:
     """A channel wanted from a file: its name, where it is found and how it is to be understood.
 
-    ``factor`` is sign times scale; ``increment`` marks angles or velocities gained since the last row.
+    ``factor`` is sign times scale; ``increment`` marks angles or velocities gained since the last row. One that was
+    recognised has a ``grade`` (certain, likely, guess), the reason (``because``), and a guess its ``question``.
     """
 
     name: str
@@ -53,6 +54,9 @@ class Channel:
     unit: Unit
     factor: float = 1.0
     increment: bool = False
+    grade: str = ""
+    because: str = ""
+    question: str = ""
 
     @property
     def sensor(self) -> str:

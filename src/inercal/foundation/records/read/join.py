@@ -130,7 +130,9 @@ def row_rate(channels: Sequence[Channel], rate: float | None, path: Path) -> flo
     if of_a_table(channel.name for channel in channels) and not any(each.increment for each in channels):
         return 1.0
     raise RecordError(
-        path, 'found no time column t, expected one, or [time] rate = "100 Hz" (say) in a column map'
+        path,
+        'found no time column t, expected one, or the sample rate: [time] rate = "100 Hz" (say) in a '
+        'column map, or --answer "rate=100 Hz"',
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.records.guessed_units import quoted
+from inercal.foundation.records.recognise.units import quoted
 from inercal.foundation.records.recognise.words import MEASURED, Said, said
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -18,12 +18,13 @@ _RATES = 4.0, 4500.0  # Hz
 
 @dataclass(frozen=True)
 class ClockFound:
-    """The column of times, its ``unit``, the ``grade`` of that, and why."""
+    """The column of times, its ``unit``, the ``grade`` of that, why, and what a guess asks."""
 
     column: int
     unit: str
     grade: str
     reason: str
+    question: str = ""
 
 
 def clock(names: Sequence[str], units: Sequence[str | None], values: Array) -> ClockFound | None:
@@ -51,9 +52,9 @@ def clock(names: Sequence[str], units: Sequence[str | None], values: Array) -> C
         grade = {3: "certain", 2: "likely"}.get(rank, "guess")
         score = rank + 0.5 * timely - 3.0 * float((steps == 0.0).mean()) - 0.01 * index
         how = "with this unit" if words.unit == unit else f"the interval is {step:.6g}"
-        found.append(
-            (score, ClockFound(index, unit, grade, f"the header says {quoted(name.strip())}; {how}"))
-        )
+        asked = f"Is the time in {unit}? Its interval is {step:.6g}, and nothing else tells."
+        reason = f"the header says {quoted(name.strip())}; {how}"
+        found.append((score, ClockFound(index, unit, grade, reason, asked if grade == "guess" else "")))
     return max(found, key=lambda scored: scored[0])[1] if found else None
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.records.guessed_units import quoted
 from inercal.foundation.records.recognise.physics import (
     G0,
     SIZES,
@@ -20,6 +19,7 @@ from inercal.foundation.records.recognise.physics import (
     norm_of,
     turns,
 )
+from inercal.foundation.records.recognise.units import quoted
 from inercal.foundation.records.recognise.words import MEASURED, Said, said, sensors_named, words_of
 
 
@@ -203,10 +203,9 @@ def _with_gyro_unit(
         return _alike("gyro", triad, "count" if beside_counts else "mdeg/s", "likely", reason)
     noise = float(np.nanmedian(np.abs(np.diff(rates, axis=0))))
     unit = "deg/s" if noise > 0.012 and reach > 5.0 else "rad/s"
-    reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}; check whether deg/s or rad/s"
-    question = (
-        f"Is the gyro in {unit}? It moves by {reach:.3g}, its noise is {noise:.2g}, and nothing else tells."
-    )
+    reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}"
+    other = "rad/s" if unit == "deg/s" else "deg/s"
+    question = f"Is the gyro in {unit} or {other}? It moves by {reach:.3g}, and nothing else tells."
     return _alike("gyro", triad, unit, "guess", reason, question)
 
 

@@ -1,9 +1,9 @@
-"""A first column map for files nobody has described, with the reason for each guess beside it."""
+"""Channels of a file: by the names in its header, by numbers and physics, or by the shape of an array without names."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,13 +11,13 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.records.channels import Origin, of_a_table
-from inercal.foundation.records.guessed_units import EVERYDAY, Guess, median, quoted, units_of
+from inercal.foundation.records.channels import Origin
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.read import format_of
 from inercal.foundation.records.read.table import FirstLook
 from inercal.foundation.records.recognise.clocks import clock
 from inercal.foundation.records.recognise.sensors import sensors
+from inercal.foundation.records.recognise.units import Guess, median, quoted, units_of
 from inercal.foundation.records.recognise.words import said
 from inercal.foundation.records.titles import (
     OF_A_MODEL,
@@ -29,18 +29,18 @@ from inercal.foundation.records.titles import (
     titled,
     triads_by_name,
 )
-from inercal.foundation.units import parse_quantity, parse_unit
+from inercal.foundation.units import parse_unit
+
+MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
+"""Channels that measure motion."""
 
 _IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
-_RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
-_MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
 _LISTED = 40
-_OPEN_RATE = ("# there is no time column", "[time]", 'rate = "PUT THE SAMPLE RATE HERE, such as 100 Hz"')
 _HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
 
 @dataclass(frozen=True)
-class _File:
+class FileGuess:
     """Guess about one file, or about the columns of one clock in it."""
 
     path: Path
@@ -50,69 +50,7 @@ class _File:
     transposed: bool = False
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def guess_map(
-    paths: str | Path | Sequence[str | Path],
-    on_table: bool = False,
-    of_model: bool = False,
-    rate: str | None = None,
-) -> str:
-    """Guess a column map from the files of one record themselves; of repeat runs the first is looked at.
-
-    Headers are told by their names (``ax``, ``gyr_y``, ``imu.acc.z``, ``timestamp``) and units, arrays without a
-    header by their shape: the time is the column that always rises, a triad goes by the name of its array or file,
-    a unit by the size of gravity. Of a test ``on_table`` columns without names are not guessed, for angles and outputs
-    look alike; nor those ``of_model`` that pitches, whose accelerometers are ``a1`` to ``an`` by their numbers or axes.
-
-    ``rate`` is the sample rate, as text with its unit, where there is no time column. The map is TOML that reads these
-    files, with a comment on each guess and on columns not used. Where no sensor was recognised, there are only
-    comments, to write the map by. Raises `RecordError` where a file cannot be read, or nothing in it looks like a
-    channel.
-    """
-    files: list[_File] = []
-    hertz = None if rate is None else parse_quantity(rate, "frequency", "rate").value
-    for path in [paths] if isinstance(paths, str | Path) else paths:
-        looked = _look(Path(path), on_table, of_model, hertz)
-        if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
-            files += looked
-    if not any(_MEASURED.fullmatch(name) for file in files for name in file.guesses):
-        return _skeleton(
-            files, "phi1 phi2 acc_x" if on_table else "a1 a2 gyro" if of_model else "acc_x acc_y gyro_x"
-        )
-    names = dict.fromkeys(quoted(file.path.name) for file in files)
-    lines = [
-        f"# Guessed from {', '.join(names)}: check each line, above all",
-        "# the units, the order of the axes and their signs.",
-    ]
-    if len(files) == 1:
-        lines += _options(files[0], "file") + _columns(files[0], "columns")
-    else:
-        for file, name in zip(files, _table_names(files), strict=True):
-            table = f"file.{name}"
-            lines += ["", f"[{table}]", f"path = {quoted(file.path.name)}", *_options(file, "")]
-            lines += _columns(file, f"{table}.columns")
-    for file in files:
-        lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
-    if rate is not None and all("t" in file.guesses for file in files):
-        raise RecordError(files[0].path, "found a column of times, expected none beside a sample rate")
-    if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
-        lines += _rate([line for file in files for line in file.leading], rate)
-    return "\n".join(lines) + "\n"
-
-
-def of_means(column_map: str) -> str:
-    """The map without the sample rate that is to be filled in: rows of means need no times."""
-    return column_map.replace("\n" + "\n".join(_OPEN_RATE), "")
-
-
-def columns_of(path: Path) -> tuple[Origin, ...]:
-    """The columns of a file in their order, as a map names them; raises `RecordError` where it cannot be read."""
-    return tuple(
-        _origin(sample, index) for sample in _samples(path) for index in range(sample.values.shape[1])
-    )
-
-
-def _samples(path: Path) -> Sequence[FirstLook]:
+def samples_of(path: Path) -> Sequence[FirstLook]:
     """The first look at the arrays of a file; raises `RecordError`."""
     try:
         return format_of(path).peek(path)
@@ -120,9 +58,9 @@ def _samples(path: Path) -> Sequence[FirstLook]:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
 
 
-def _look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> list[_File]:
+def look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> list[FileGuess]:
     """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
-    samples = sorted(_samples(path), key=lambda sample: -len(sample.values))
+    samples = sorted(samples_of(path), key=lambda sample: -len(sample.values))
     lengths: dict[int, dict[str, Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
@@ -134,12 +72,12 @@ def _look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> lis
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
     lying = any(sample.options.transpose for sample in samples)
-    files = [_File(path, longest, leading, transposed=lying)]
+    files = [FileGuess(path, longest, leading, transposed=lying)]
     for guesses in others:
         guessed = {name for file in files for name in file.guesses} - {"t"}
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
         if "t" in new and len(new) > 1:
-            files.append(_File(path, new, (), transposed=lying))
+            files.append(FileGuess(path, new, (), transposed=lying))
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
@@ -152,13 +90,13 @@ def _held(samples: Sequence[FirstLook]) -> str:
     )
 
 
-def _unused(samples: Sequence[FirstLook], files: Sequence[_File]) -> tuple[str, ...]:
+def _unused(samples: Sequence[FirstLook], files: Sequence[FileGuess]) -> tuple[str, ...]:
     """The columns that are no channel: how a map names them, and how they begin."""
     used = [guess.origin for file in files for guess in file.guesses.values()]
     columns = []
     for sample in samples:
         for index, values in enumerate(sample.values.T):
-            if (origin := _origin(sample, index)) in used:
+            if (origin := origin_of(sample, index)) in used:
                 continue
             begins = ", ".join(f"{value:.6g}" for value in values[:3])
             if np.isnan(values).all():
@@ -167,20 +105,6 @@ def _unused(samples: Sequence[FirstLook], files: Sequence[_File]) -> tuple[str, 
             columns.append(f"{place} ({begins})")
     more = [f"{len(columns) - _LISTED} more"] if len(columns) > _LISTED else []
     return (*columns[:_LISTED], *more)
-
-
-def _skeleton(files: Sequence[_File], names: str) -> str:
-    """A map that says nothing yet: what to write, such as these channels, and the columns there are."""
-    first, *others = names.split()
-    unit = next(unit for unit in EVERYDAY[1:] if fits(first, unit))
-    lines = ["# No accelerometer or gyro was recognised. Give each channel its column and unit, for example"]
-    lines += [f"# [columns.{first}]", "# from = 1", f"# unit = {quoted(unit)}", "#"]
-    lines += [f"# and likewise t, {', '.join(others)}. Without a time column, state the rate:"]
-    lines += ["# [time]", '# rate = "100 Hz"', "#", "# What there is, with the first numbers:"]
-    for file in files:
-        held = [f"{quoted(guess.origin)} (perhaps {name})" for name, guess in file.guesses.items()]
-        lines += [f"# {quoted(file.path.name)}", *(f"#   {column}" for column in (*held, *file.unused))]
-    return "\n".join(lines) + "\n"
 
 
 def _by_header(
@@ -203,28 +127,29 @@ def _by_header(
         if name == "temperature" and unit is None and abs(median(values)) > _HOT:
             continue
         reason = f"the header says {quoted(title)}"
-        guesses.append(Guess(name, _origin(sample, index), values, unit, reason))
+        guesses.append(Guess(name, origin_of(sample, index), values, unit, reason))
     if of_model:
         return _counted(guesses)
     if not on_table:
         return _recognised(sample, guesses, file, rate)
-    return guesses if any(_MEASURED.fullmatch(each.name) for each in guesses) else guesses + _by_norm(sample)
+    return guesses if any(MEASURED.fullmatch(each.name) for each in guesses) else guesses + _by_norm(sample)
 
 
 def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float | None) -> list[Guess]:
     """Channels by their names, the accelerometers and gyros among them recognised by all the evidence there is."""
     if found_t := clock(sample.names, sample.units, sample.values):
-        origin, values = _origin(sample, found_t.column), sample.values[:, found_t.column]
-        what = Guess("t", origin, values, found_t.unit, found_t.reason, found_t.grade)
+        origin, values = origin_of(sample, found_t.column), sample.values[:, found_t.column]
+        said_of = found_t.unit, found_t.reason, found_t.grade, found_t.question
+        what = Guess("t", origin, values, *said_of)
         guesses = [what, *(guess for guess in guesses if guess.name != "t" and guess.origin != origin)]
     by_name = {guess.name: guess for guess in reversed(guesses)}
     t = None if rate is None else np.arange(len(sample.values)) / rate
     if stamps := by_name.get("t"):
-        t = stamps.values * parse_unit(units_of({"t": stamps})["t"][0]).factor
+        t = stamps.values * parse_unit(units_of({"t": stamps})["t"].unit).factor
     triads = sensors(sample.names, sample.units, sample.values, t, file)
-    used = {_origin(sample, index) for triad in triads for index in triad.columns}
+    used = {origin_of(sample, index) for triad in triads for index in triad.columns}
     found = {triad.sensor for triad in triads}
-    titles = {_origin(sample, index): name for index, name in enumerate(sample.names)}
+    titles = {origin_of(sample, index): name for index, name in enumerate(sample.names)}
     kept = [
         guess
         for guess in guesses
@@ -234,7 +159,7 @@ def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float 
     ]
     for triad in triads:
         for axis, index, unit in zip("xyz", triad.columns, triad.units, strict=True):
-            values, origin = sample.values[:, index], _origin(sample, index)
+            values, origin = sample.values[:, index], origin_of(sample, index)
             what = Guess(
                 f"{triad.sensor}_{axis}", origin, values, unit, triad.reason, triad.grade, triad.question
             )
@@ -271,7 +196,7 @@ def _by_norm(sample: FirstLook) -> list[Guess]:
     able = [unit is None or fits("acc_x", unit) for unit in units]
     found = [list(triad) for triad in triads_by_name(sample.names) if all(able[index] for index in triad)]
     return [
-        Guess(f"{sensor}_{axis}", _origin(sample, index), sample.values[:, index], units[index], reason)
+        Guess(f"{sensor}_{axis}", origin_of(sample, index), sample.values[:, index], units[index], reason)
         for sensor, triad, reason in (_sensors(sample.values, found, ()) if len(found) in (1, 2) else ())
         for axis, index in zip("xyz", triad, strict=True)
     ]
@@ -283,7 +208,7 @@ def _is_clock(values: Array) -> bool:
     return bool((step >= 0.0).all() and (step > 0.0).any())
 
 
-def _origin(sample: FirstLook, index: int) -> Origin:
+def origin_of(sample: FirstLook, index: int) -> Origin:
     """The name of a column in a map."""
     if sample.names:
         return (
@@ -299,7 +224,7 @@ def _by_shape(sample: FirstLook, path: Path) -> list[Guess]:
     values = sample.values
 
     def guess(name: str, index: int, reason: str) -> Guess:
-        return Guess(name, _origin(sample, index), values[:, index], None, reason)
+        return Guess(name, origin_of(sample, index), values[:, index], None, reason)
 
     rising = [index for index in range(values.shape[1]) if (np.diff(values[:, index]) > 0).all()]
     guesses = [guess("t", rising[0], "the column that always rises")] if rising else []
@@ -338,60 +263,3 @@ def _spread(triad: Array) -> float:
     norm = np.linalg.norm(triad, axis=1)
     middle = median(norm)
     return median(np.abs(norm - middle)) / middle if middle > 0 else np.inf
-
-
-def _columns(file: _File, table: str) -> list[str]:
-    """The columns of a file as TOML."""
-    units = units_of(file.guesses)
-    lines = []
-    for name, guess in file.guesses.items():
-        unit, reason = units[name]
-        comment = guess.reason if name == "label" else f"{guess.reason}; {reason}"
-        if name[1:].isdigit() and name[0] == "a":
-            comment += f"; say under [sensors.{name}] of the study where it sits and points"
-        origin = list(guess.origin) if isinstance(guess.origin, tuple) else guess.origin
-        lines += [f"# QUESTION: {guess.question}"] if guess.question and name.endswith("_x") else []
-        lines += ["", f"# {comment}", f"[{table}.{name}]", f"from = {quoted(origin)}"]
-        lines += [] if name == "label" else [f"unit = {quoted(unit)}"]
-    return lines
-
-
-def _options(file: _File, table: str) -> list[str]:
-    """The layout of a file as TOML, as far as it is not found out on reading."""
-    lines = []
-    if file.leading:
-        lines += [
-            f"skip = {len(file.leading)}",
-            f"# the first of these lines is {quoted(file.leading[0][:60])}",
-        ]
-    if file.transposed:
-        lines += ["# channels are rows", "transpose = true"]
-    if not lines:
-        return []
-    return ["", f"[{table}]", *lines] if table else lines
-
-
-def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
-    """The sample rate as TOML, where there is no time column: as stated, or as a line of the file says."""
-    if rate is not None:
-        return ["", "# there is no time column", "[time]", f"rate = {quoted(rate)}"]
-    sentence = next((line for line in leading if _RATE.search(line)), None)
-    match = _RATE.search(sentence) if sentence is not None else None
-    if sentence is not None and match:
-        return [
-            "",
-            f"# there is no time column; a line says {quoted(sentence[:60])}",
-            "[time]",
-            f'rate = "{match[1]} Hz"',
-        ]
-    return ["", *_OPEN_RATE]
-
-
-def _table_names(files: Sequence[_File]) -> list[str]:
-    """``acc`` or ``gyro`` for a file of that triad alone, else by its number."""
-    names = []
-    for number, file in enumerate(files, 1):
-        sensors = {name.rpartition("_")[0] for name in file.guesses if name not in ("t", "label")}
-        name = sensors.pop() if sensors in ({"acc"}, {"gyro"}) else f"part{number}"
-        names.append(name if name not in names else f"part{number}")
-    return names
