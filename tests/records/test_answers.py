@@ -30,6 +30,7 @@ def still(folder):
     return written(folder / "still.csv", "time,gx,gy,gz\n", STILL)
 
 
+@pytest.mark.slow
 @for_each("command", [["allan"], ["temperature"], ["calibrate", "imu", "--latitude=48 deg"]])
 def test_a_guess_is_refused_with_its_question_and_the_answer(tmp_path_factory, monkeypatch, capsys, command):
     """In one sentence, with a map or without one; what it names is an answer that is taken."""
@@ -46,6 +47,7 @@ def test_a_guess_is_refused_with_its_question_and_the_answer(tmp_path_factory, m
         assert '--answer "gyro=rad/s"' in said
 
 
+@pytest.mark.slow
 def test_an_answer_makes_a_guess_certain(folder, capsys):
     """By `new`, beside the map or without one: the same numbers; and inspect shows a guess as such."""
     still(folder)
@@ -129,6 +131,7 @@ def test_without_a_study_the_latitude_is_asked_for(folder, capsys):
     assert '--latitude: missing, expected it where there is no --study, such as "48 deg"' in said
 
 
+@pytest.mark.slow
 def test_a_result_without_a_map_is_run_again(folder, capsys):
     written(folder / "log.csv", "time,ax,ay,az,gx,gy,gz\n", SEEN)
     assert run(["store", "init", "--store", "kept"]) == 0

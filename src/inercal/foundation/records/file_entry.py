@@ -12,6 +12,7 @@ from inercal.foundation._toml import Strict
 from inercal.foundation.errors import InputError
 from inercal.foundation.records.checksums import CHECKS, NONE
 from inercal.foundation.records.frames import Frame
+from inercal.foundation.records.read.rewriting import PLACE
 from inercal.foundation.records.read.table import FileOptions
 from inercal.foundation.units import shown
 
@@ -31,6 +32,22 @@ class FileEntry(Strict):
     )
     skip: int = Field(
         default=0, ge=0, description="lines before the header or the numbers; bytes of a binary file"
+    )
+    lines: Literal["json", "documents"] | None = Field(
+        default=None,
+        description="what stands in the lines of a text: an object of JSON each, or documents between lines ---; "
+        "`from` names a number by its names, joined by points",
+    )
+    message: str | None = Field(
+        default=None,
+        min_length=1,
+        description="word with which the lines to read begin, of a text with several kinds; it is column 0",
+        examples=["IMU"],
+    )
+    pattern: list[str] = Field(
+        default=[],
+        description="lines with words before numbers: the words, with {} for each number; several make a row",
+        examples=[["Acc: {}, {}, {} Gyro: {}, {}, {}"]],
     )
     variable: str | None = Field(
         default=None, description="variable, group or topic that holds the columns, where a file has several"
@@ -124,6 +141,9 @@ class FileEntry(Strict):
             tuple(self.types),
             tuple(self.fields),
             self.frame,
+            self.lines or "",
+            self.message or "",
+            tuple(self.pattern),
         )
 
     @model_validator(mode="after")
@@ -155,6 +175,19 @@ class FileEntry(Strict):
             )
         if all(each.startswith("x") for each in self.types):
             raise _refusal("found bytes of no use alone, expected a number at least")
+        return self
+
+    @model_validator(mode="after")
+    def _of_one_kind(self) -> FileEntry:
+        """Lines are of one kind, which leaves nothing else to say of their layout."""
+        kinds = [name for name in ("lines", "message", "pattern") if getattr(self, name)]
+        others = ("delimiter", "decimal", "comment", "binary")
+        if len(kinds) > 1 or (kinds and any(getattr(self, name) for name in others)):
+            raise _refusal(
+                f"found {', '.join(kinds)} beside {', '.join(others)} or each other, expected one alone"
+            )
+        if self.pattern and not any(PLACE in text for text in self.pattern):
+            raise _refusal("found a pattern without {}, expected one for each number")
         return self
 
     @model_validator(mode="after")

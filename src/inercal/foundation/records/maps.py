@@ -12,7 +12,15 @@ from pydantic import Field, field_validator
 
 from inercal.foundation._toml import Strict, check, read_toml
 from inercal.foundation.errors import InputError, MapError
-from inercal.foundation.records.channels import Channel, Origin, is_channel, misfit, nearest, needs_unit
+from inercal.foundation.records.channels import (
+    Channel,
+    Origin,
+    TimeForm,
+    is_channel,
+    misfit,
+    nearest,
+    needs_unit,
+)
 from inercal.foundation.records.file_entry import FileEntry
 from inercal.foundation.records.read.table import FileShare
 from inercal.foundation.units import parse_quantity, parse_unit, shown
@@ -86,6 +94,28 @@ class TimeEntry(Strict):
         examples=["100.00(1) Hz"],
     )
     ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
+    stamps: Literal["year-first", "day-first", "month-first", "time of day"] | None = Field(
+        default=None,
+        description="order of dates with times in words; time of day alone goes on over midnight",
+    )
+    beside: Any = Field(
+        default=None,
+        description="column of what stands beside t: the time of day of a date, or the rest of whole seconds",
+        examples=["Time"],
+    )
+    rest: str | None = Field(default=None, description="unit of the rest of whole seconds", examples=["ns"])
+    wrap: float = Field(
+        default=0.0, ge=0.0, description="number at which the counter t falls to zero", examples=[4294967296]
+    )
+
+    @property
+    def of_t(self) -> TimeForm | None:
+        """The stamps of the channel t, None where they are plain numbers."""
+        if not (self.stamps or self.wrap or self.rest):
+            return None
+        rest = parse_unit(self.rest, "time.rest").factor if self.rest else 0.0
+        beside = tuple(self.beside) if isinstance(self.beside, list) else self.beside
+        return TimeForm(self.stamps or "", beside, rest, self.wrap)
 
 
 class MapEntry(Strict):
@@ -222,9 +252,10 @@ def map_of(data: dict[str, Any], path: str | Path, written: bool = True) -> Reco
     entry = check(MapEntry, data, path, MapError)
     if not entry.columns and not named:
         raise MapError(path, "columns: missing, expected at least one [columns.NAME] or [file.NAME]")
-    plain = (FileShare(_channels(entry.columns, path), entry.file.laid_out),) if entry.columns else ()
+    of_t = entry.time.of_t
+    plain = (FileShare(_channels(entry.columns, path, of_t), entry.file.laid_out),) if entry.columns else ()
     rate, rate_u = _rate(entry.time, path)
-    parts = (*plain, *(_part(name, named[name], path) for name in named))
+    parts = (*plain, *(_part(name, named[name], path, of_t) for name in named))
     files = sorted({Path(part.path) for part in parts if part.name})
     if len({file.name for file in files}) < len(files):
         names = ", ".join(map(str, files))
@@ -232,11 +263,11 @@ def map_of(data: dict[str, Any], path: str | Path, written: bool = True) -> Reco
     return RecordMap(Path(path), parts, rate, entry.time.ignore, rate_u, written)
 
 
-def _part(name: str, table: Mapping[str, Any], path: object) -> FileShare:
+def _part(name: str, table: Mapping[str, Any], path: object, of_t: TimeForm | None) -> FileShare:
     """One ``[file.NAME]``."""
     where = f"{path}: file.{name}"
     entry = check(NamedFileEntry, table, where, MapError)
-    return FileShare(_channels(entry.columns, where), entry.laid_out, name, entry.path)
+    return FileShare(_channels(entry.columns, where, of_t), entry.laid_out, name, entry.path)
 
 
 def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:
@@ -252,11 +283,14 @@ def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:
     return rate.value, rate.u / rate.value
 
 
-def _channels(columns: Mapping[str, ColumnEntry], where: object) -> tuple[Channel, ...]:
-    """The channels of a ``columns`` table, names and units checked."""
-    return tuple(
+def _channels(
+    columns: Mapping[str, ColumnEntry], where: object, of_t: TimeForm | None
+) -> tuple[Channel, ...]:
+    """The channels of a ``columns`` table, names and units checked; the time has stamps ``of_t``."""
+    channels = [
         _channel(name, entry, f"{where}: columns.{shown(name)[1:-1]}") for name, entry in columns.items()
-    )
+    ]
+    return tuple(replace(each, stamps=of_t) if each.name == "t" else each for each in channels)
 
 
 def _channel(name: str, entry: ColumnEntry, where: str) -> Channel:

@@ -20,11 +20,6 @@ from inercal.foundation.records.titles import fits
 from inercal.foundation.units import parse_quantity
 
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
-_OPEN_RATE = (
-    "# there is no time column: state the sample rate where times are needed, such as 100 Hz",
-    "[time]",
-    f"rate = {quoted(OPEN)}",
-)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -79,8 +74,7 @@ def guess_map(
         lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
     if rate is not None and all("t" in file.guesses for file in files):
         raise RecordError(files[0].path, "found a column of times, expected none beside a sample rate")
-    if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
-        lines += _rate([line for file in files for line in file.leading], rate)
+    lines += _time(files, rate)
     return "\n".join(lines) + "\n"
 
 
@@ -153,33 +147,57 @@ def _columns(file: FileGuess, table: str, answers: Mapping[str, str]) -> list[st
 
 def _options(file: FileGuess, table: str) -> list[str]:
     """The layout of a file as TOML, as far as it is not found out on reading."""
-    lines = []
+    lines, options = [], file.options
     if file.leading:
         lines += [
             f"skip = {len(file.leading)}",
             f"# the first of these lines is {quoted(file.leading[0][:60])}",
         ]
-    if file.transposed:
+    if options.transpose:
         lines += ["# channels are rows", "transpose = true"]
+    lines += [f"lines = {quoted(options.lines)}"] if options.lines else []
+    lines += [f"message = {quoted(options.message)}"] if options.message else []
+    lines += [f"pattern = {quoted(list(options.pattern))}"] if options.pattern else []
     if not lines:
         return []
     return ["", f"[{table}]", *lines] if table else lines
 
 
-def _rate(leading: Iterable[str], rate: str | None) -> list[str]:
-    """The sample rate as TOML, where there is no time column: as stated, or as a line of the file says."""
+def _time(files: Sequence[FileGuess], rate: str | None) -> list[str]:
+    """The table of the time as TOML: how stamps are read, and the rate where files have none.
+
+    Raises `RecordError` where two files have stamps of different kinds, which one map cannot say.
+    """
+    kinds = {file.guesses["t"].stamps: file for file in files if "t" in file.guesses}
+    if len(kinds) > 1:
+        raise RecordError(
+            list(kinds.values())[1].path, "has stamps of another kind, expected those of the first file"
+        )
+    lines: list[str] = []
+    comment: list[str] = []
+    for stamps in filter(None, kinds):
+        lines += [f"stamps = {quoted(stamps.order)}"] if stamps.order else []
+        lines += [f"beside = {quoted(stamps.beside)}"] if stamps.beside is not None else []
+        lines += [f'rest = "{"ns" if stamps.rest < 1e-7 else "us"}"'] if stamps.rest else []
+        lines += [f"wrap = {stamps.wrap:.0f}"] if stamps.wrap else []
+    if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
+        comment, stated = _rate([line for file in files for line in file.leading], rate)
+        lines += stated
+    return ["", *comment, "[time]", *lines] if lines else []
+
+
+def _rate(leading: Iterable[str], rate: str | None) -> tuple[list[str], list[str]]:
+    """A comment on the sample rate of files without times, and the rate: as stated, or as a line of a file says."""
     if rate is not None:
-        return ["", "# there is no time column", "[time]", f"rate = {quoted(rate)}"]
+        return ["# there is no time column"], [f"rate = {quoted(rate)}"]
     sentence = next((line for line in leading if _RATE.search(line)), None)
     match = _RATE.search(sentence) if sentence is not None else None
     if sentence is not None and match:
-        return [
-            "",
-            f"# there is no time column; a line says {quoted(sentence[:60])}",
-            "[time]",
-            f'rate = "{match[1]} Hz"',
+        return [f"# there is no time column; a line says {quoted(sentence[:60])}"], [
+            f'rate = "{match[1]} Hz"'
         ]
-    return ["", *_OPEN_RATE]
+    comment = "# there is no time column: state the sample rate where times are needed, such as 100 Hz"
+    return [comment], [f"rate = {quoted(OPEN)}"]
 
 
 def _table_names(files: Sequence[FileGuess]) -> list[str]:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.records.channels import Origin
+from inercal.foundation.records.channels import Origin, TimeForm
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.read import format_of
-from inercal.foundation.records.read.table import FirstLook
+from inercal.foundation.records.read.join import unwrapped
+from inercal.foundation.records.read.table import FileOptions, FirstLook
+from inercal.foundation.records.read.time_stamps import seconds_of
 from inercal.foundation.records.recognise.clocks import clock
 from inercal.foundation.records.recognise.sensors import sensors
 from inercal.foundation.records.recognise.units import Guess, median, quoted, units_of
-from inercal.foundation.records.recognise.words import said
+from inercal.foundation.records.recognise.words import said, sensors_named
 from inercal.foundation.records.titles import (
     OF_A_MODEL,
     bare,
@@ -34,7 +36,6 @@ from inercal.foundation.units import parse_unit
 MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
 """Channels that measure motion."""
 
-_IN_NAMES = {"acc": r"acc|alpha", "gyro": r"gyr|omega"}
 _LISTED = 40
 _HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
@@ -47,7 +48,7 @@ class FileGuess:
     guesses: Mapping[str, Guess]
     leading: tuple[str, ...]
     unused: tuple[str, ...] = ()
-    transposed: bool = False
+    options: FileOptions = field(default_factory=FileOptions)
 
 
 def samples_of(path: Path) -> Sequence[FirstLook]:
@@ -66,18 +67,20 @@ def look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> list
         guesses = lengths.setdefault(len(sample.values), {})
         named = sample.names or on_table or of_model
         for guess in (
-            _by_header(sample, on_table, of_model, path.name, rate) if named else _by_shape(sample, path)
+            _by_header(sample, on_table, of_model, path.name, rate)
+            if named
+            else _by_shape(sample, path, rate)
         ):
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
-    lying = any(sample.options.transpose for sample in samples)
-    files = [FileGuess(path, longest, leading, transposed=lying)]
+    options = next((sample.options for sample in samples if sample.options.transpose), samples[0].options)
+    files = [FileGuess(path, longest, leading, options=options)]
     for guesses in others:
         guessed = {name for file in files for name in file.guesses} - {"t"}
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
         if "t" in new and len(new) > 1:
-            files.append(FileGuess(path, new, (), transposed=lying))
+            files.append(FileGuess(path, new, (), options=options))
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
@@ -100,7 +103,7 @@ def _unused(samples: Sequence[FirstLook], files: Sequence[FileGuess]) -> tuple[s
                 continue
             begins = ", ".join(f"{value:.6g}" for value in values[:3])
             if np.isnan(values).all():
-                begins = "no numbers; dates and words are not read"
+                begins = "no numbers"
             place = quoted(list(origin) if isinstance(origin, tuple) else origin)
             columns.append(f"{place} ({begins})")
     more = [f"{len(columns) - _LISTED} more"] if len(columns) > _LISTED else []
@@ -137,10 +140,12 @@ def _by_header(
 
 def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float | None) -> list[Guess]:
     """Channels by their names, the accelerometers and gyros among them recognised by all the evidence there is."""
-    if found_t := clock(sample.names, sample.units, sample.values):
+    if found_t := clock(sample.names, sample.units, sample.values, sample.texts):
         origin, values = origin_of(sample, found_t.column), sample.values[:, found_t.column]
         said_of = found_t.unit, found_t.reason, found_t.grade, found_t.question
-        what = Guess("t", origin, values, *said_of)
+        if found_t.stamps is not None:
+            values = _times(sample, found_t.column, found_t.stamps)
+        what = Guess("t", origin, values, *said_of, _placed(sample, found_t.stamps))
         guesses = [what, *(guess for guess in guesses if guess.name != "t" and guess.origin != origin)]
     by_name = {guess.name: guess for guess in reversed(guesses)}
     t = None if rate is None else np.arange(len(sample.values)) / rate
@@ -195,11 +200,23 @@ def _by_norm(sample: FirstLook) -> list[Guess]:
     ]
     able = [unit is None or fits("acc_x", unit) for unit in units]
     found = [list(triad) for triad in triads_by_name(sample.names) if all(able[index] for index in triad)]
-    return [
-        Guess(f"{sensor}_{axis}", origin_of(sample, index), sample.values[:, index], units[index], reason)
-        for sensor, triad, reason in (_sensors(sample.values, found, ()) if len(found) in (1, 2) else ())
-        for axis, index in zip("xyz", triad, strict=True)
+    if len(found) not in (1, 2):
+        return []
+    spread = [_spread(sample.values[:, triad]) for triad in found]
+    acc = int(np.argmin(spread))
+    kinds = [
+        "acc" if place == acc and (len(found) == 2 or spread[0] < 0.2) else "gyro"
+        for place in range(len(found))
     ]
+    steadier = "the norm is steady" if len(found) == 1 else "of two triads, this has the steadier norm"
+    return [
+        Guess(
+            f"{kind}_{axis}", origin_of(sample, index), sample.values[:, index], units[index],
+            steadier if kind == "acc" else "the norm varies",
+        )
+        for kind, triad in zip(kinds, found, strict=True)
+        for axis, index in zip("xyz", triad, strict=True)
+    ]  # fmt: skip
 
 
 def _is_clock(values: Array) -> bool:
@@ -208,9 +225,28 @@ def _is_clock(values: Array) -> bool:
     return bool((step >= 0.0).all() and (step > 0.0).any())
 
 
+def _times(sample: FirstLook, column: int, stamps: TimeForm) -> Array:
+    """Times of stamps, in the unit of their numbers, as a map reads them."""
+    beside = stamps.beside if isinstance(stamps.beside, int) else None
+    if stamps.order:
+        of_day = None if beside is None else sample.texts[beside]
+        return seconds_of(sample.texts[column], stamps.order, of_day)
+    values = sample.values[:, column]
+    if stamps.wrap:
+        return unwrapped(values, stamps.wrap)
+    return values if beside is None else values + stamps.rest * sample.values[:, beside]
+
+
+def _placed(sample: FirstLook, stamps: TimeForm | None) -> TimeForm | None:
+    """Stamps whose column beside is named as a map names it."""
+    if stamps is None or not isinstance(stamps.beside, int):
+        return stamps
+    return replace(stamps, beside=origin_of(sample, stamps.beside))
+
+
 def origin_of(sample: FirstLook, index: int) -> Origin:
     """The name of a column in a map."""
-    if sample.names:
+    if any(sample.names):
         return (
             sample.names[index]
             if not sample.numbered and sample.names.count(sample.names[index]) == 1
@@ -219,43 +255,15 @@ def origin_of(sample: FirstLook, index: int) -> Origin:
     return (sample.variable, index) if sample.variable else index
 
 
-def _by_shape(sample: FirstLook, path: Path) -> list[Guess]:
-    """Channels of an array without a header: a time that rises, and one triad or two."""
-    values = sample.values
-
-    def guess(name: str, index: int, reason: str) -> Guess:
-        return Guess(name, origin_of(sample, index), values[:, index], None, reason)
-
-    rising = [index for index in range(values.shape[1]) if (np.diff(values[:, index]) > 0).all()]
-    guesses = [guess("t", rising[0], "the column that always rises")] if rising else []
-    rest = [index for index in range(values.shape[1]) if index not in rising[:1]]
-    if len(rest) not in (3, 6):
-        return guesses if not rest else []
-    triads = [rest[:3], rest[3:]] if len(rest) == 6 else [rest]
-    for sensor, triad, reason in _sensors(values, triads, (sample.variable, path.name)):
-        guesses += [
-            guess(f"{sensor}_{axis}", index, reason) for axis, index in zip("xyz", triad, strict=True)
-        ]
-    return guesses
-
-
-def _sensors(
-    values: Array, triads: list[list[int]], names: tuple[str, ...]
-) -> list[tuple[str, list[int], str]]:
-    """Which triad is which sensor, and why."""
-    for name in names if len(triads) == 1 else ():
-        named = [sensor for sensor, pattern in _IN_NAMES.items() if re.search(pattern, name, re.IGNORECASE)]
-        if len(named) == 1:
-            return [(named[0], triads[0], f"the name says {quoted(name)}")]
-    spread = [_spread(values[:, triad]) for triad in triads]
-    acc = int(np.argmin(spread))
-    if len(triads) == 1:
-        sensor = "acc" if spread[0] < 0.2 else "gyro"
-        return [(sensor, triads[0], "its norm is steady" if sensor == "acc" else "its norm varies")]
-    return [
-        ("acc", triads[acc], "of the two triads the one with the steadier norm"),
-        ("gyro", triads[1 - acc], "of the two triads the one with the less steady norm"),
-    ]
+def _by_shape(sample: FirstLook, path: Path, rate: float | None) -> list[Guess]:
+    """Channels of an array without names, by its numbers, or by its own name where that says the sensor."""
+    names = ("",) * sample.values.shape[1]
+    called = (
+        path.name
+        if not sample.variable or len(sensors_named(sample.variable)) != 1
+        else f"{sample.variable}."
+    )
+    return _recognised(replace(sample, names=names, numbered=True), [], called, rate)
 
 
 def _spread(triad: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
-from inercal.foundation.records.channels import Origin, misfit, of_a_table, sensor_and_axis
+from inercal.foundation.records.channels import Origin, TimeForm, misfit, of_a_table, sensor_and_axis
 from inercal.foundation.records.titles import fits
 from inercal.foundation.units import parse_unit
 
@@ -26,7 +26,7 @@ class Guess:
     """A channel thought to be in a column: where that is, its values, a unit if it was said, and why.
 
     ``grade`` is that of a channel recognised with its unit (certain, likely or guess), empty of others; of a guess
-    there is a ``question``.
+    there is a ``question``. Of the time there may be ``stamps`` other than plain numbers.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Guess:
     reason: str
     grade: str = ""
     question: str = ""
+    stamps: TimeForm | None = None
 
 
 def median(values: Array) -> float:
