@@ -164,7 +164,7 @@ VARIANTS = {
     "bare without times": (plain("{a0} {a1} {a2} {g0} {g1} {g2}"), False),
     "bare with a status": (plain("{t},1,{a0},{a1},{a2},{g0},{g1},{g2}"), True),
     "lvm": (
-        "LabVIEW Measurement\t\nX_Columns\tOne\n***End_of_Header***\t\n\t\n" 
+        "LabVIEW Measurement\t\nX_Columns\tOne\n***End_of_Header***\t\n\t\n"
         + "X_Value\tax\tay\taz\tgx\tgy\tgz\tComment\n"
         + plain("{t}\t{a0}\t{a1}\t{a2}\t{g0}\t{g1}\t{g2}\t"),
         True,
