@@ -13,7 +13,7 @@ import numpy as np
 
 from inercal.faces.python.calibrations import estimate_of
 from inercal.faces.python.result import Result, View
-from inercal.faces.python.study import Study, study, study_of
+from inercal.faces.python.study import Study, study, study_of, with_reading
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate, timed
@@ -338,7 +338,10 @@ def temperature(
         ]
         clock = time.perf_counter()
         model = fit_calibrations(estimates, sources, about, order)
-    return of_temperature(replace(model, estimate=timed(model.estimate, clock)))
+    estimate = timed(model.estimate, clock)
+    if isinstance(given, Record):
+        estimate = with_reading(estimate, given)
+    return of_temperature(replace(model, estimate=estimate))
 
 
 def allan(record: Record) -> Result:
@@ -388,7 +391,7 @@ def allan(record: Record) -> Result:
 
         return pictures(noise)[0]
 
-    estimate = noise.estimate
+    estimate = with_reading(noise.estimate, record)
     first = noise.channels[0]
     seen = f"N_{first.name}"
     words = f"{len(noise.channels)} channels"

@@ -104,6 +104,8 @@ def said(name: str, beside: str | None = None) -> Said:
     brackets = re.findall(r"[\[(]((?![012]\])[^\[\]()]*(?:\([^()]*\))?)[\])]", name)
     unit = next((unit for text in (beside or "", *reversed(brackets)) if (unit := unit_of(text))), "")
     words = words_of(re.sub(r"[\[(](?![012]\])[^\])]*[\])]", " ", name))
+    if not unit and len(words) == 1 and len(words[0]) > 1 and MEASURED.get(unit_of(words[0])) == "t":
+        return Said("t", "", unit_of(words[0]), f"{words[0]} |")  # as the columns ms and micros
     if not unit:
         unit, words = _unit_at_end(words)
     if not unit and len(words) > 2 and words[-1] in "xyz":
