@@ -82,7 +82,7 @@ class Key:
     exact, uncertain : bool
         A quantity that is refused with an uncertainty, and one that is refused without.
     least, most : float or None
-        Bounds of a plain number; ``least`` of a list is its length.
+        Bounds of a plain number; of a list or a text those of its length.
     words : mapping
         Words that may stand in place of a quantity, and the value of the field that each is.
     of : str
@@ -179,16 +179,25 @@ def option(says: str, default: Any = REQUIRED, *, example: object = None, **more
     return dataclasses.field(default=default, metadata={"key": key})
 
 
-def table(says: str, default: Any = REQUIRED, *, example: object = None, name: str = "") -> Any:
+def table(
+    says: str, default: Any = REQUIRED, *, example: object = None, name: str = "", most: int | None = None
+) -> Any:
     """A field that a study states as a table, or as a list or table of tables: its type is a settings dataclass,
     ``Settings | None``, ``tuple[Settings, ...]`` or ``Mapping[str, Settings]``.
 
-    Keys that are absent there are those of the ``default``.
+    Keys that are absent there are those of the ``default``; ``most`` is the length of a list.
     """
-    key = Key(says, example=example, name=name, table=True)
+    key = Key(says, example=example, name=name, table=True, most=most)
     if isinstance(default, Mapping):
         return dataclasses.field(default_factory=dict, metadata={"key": key})
     return dataclasses.field(default=default, metadata={"key": key})
+
+
+def keyed(name: str, fields: Mapping[str, tuple[Any, Any]]) -> Any:
+    """A base for settings whose keys are names of a table: name of the field -> its type, and the field."""
+    return dataclasses.make_dataclass(
+        name, [(key, hint, field) for key, (hint, field) in fields.items()], frozen=True
+    )
 
 
 def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:

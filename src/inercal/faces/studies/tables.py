@@ -155,7 +155,7 @@ def _value(typed: Any, hint: str) -> Any:
         case Word():
             return typed.value
         case Several():
-            return typed.values
+            return typed.quantities if "Quantity" in hint else typed.values
         case Quantity():
             return typed if "Quantity" in hint else typed.value
         case list():
@@ -208,6 +208,7 @@ def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool)
         default = None
     plain = not (key.dimension or key.table)
     listed = get_origin(hint) is tuple
+    long = listed or hint is str
     absent = (
         ...
         if default is MISSING
@@ -225,10 +226,10 @@ def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool)
         default=absent,
         title=title,
         description=key.says,
-        ge=key.least if plain and not listed else None,
-        le=key.most if plain and not listed else None,
-        min_length=int(key.least or 0) or None if listed else None,
-        max_length=int(key.most or 0) or None if listed else None,
+        ge=key.least if plain and not long else None,
+        le=key.most if plain and not long else None,
+        min_length=int(key.least or 0) or None if long else None,
+        max_length=int(key.most or 0) or None if long else None,
         examples=None if key.example is None or quantity else [key.example],
         json_schema_extra={"default": key.default} if key.default else None,
     )
