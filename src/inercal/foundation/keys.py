@@ -84,7 +84,7 @@ class Key:
     least, most : float or None
         Bounds of a plain number; of a list or a text those of its length.
     words : mapping
-        Words that may stand in place of a quantity, and the value of the field that each is.
+        Words that may stand in place of a quantity or a table, and the value of the field that each is.
     of : str
         What the quantities of a list are for, parted by commas, where it has so many: "x, y, z".
     one : bool
@@ -179,15 +179,13 @@ def option(says: str, default: Any = REQUIRED, *, example: object = None, **more
     return dataclasses.field(default=default, metadata={"key": key})
 
 
-def table(
-    says: str, default: Any = REQUIRED, *, example: object = None, name: str = "", most: int | None = None
-) -> Any:
+def table(says: str, default: Any = REQUIRED, *, example: object = None, **more: Unpack[More]) -> Any:
     """A field that a study states as a table, or as a list or table of tables: its type is a settings dataclass,
     ``Settings | None``, ``tuple[Settings, ...]`` or ``Mapping[str, Settings]``.
 
-    Keys that are absent there are those of the ``default``; ``most`` is the length of a list.
+    Keys that are absent there are those of the ``default``; ``example`` and ``more`` are those of `Key`.
     """
-    key = Key(says, example=example, name=name, table=True, most=most)
+    key = Key(says, example=example, table=True, **more)
     if isinstance(default, Mapping):
         return dataclasses.field(default_factory=dict, metadata={"key": key})
     return dataclasses.field(default=default, metadata={"key": key})

@@ -13,8 +13,8 @@ from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.rig import RigTable, chain_of
-from inercal.faces.studies.tables import check_kind, settings_of, table_of
+from inercal.faces.studies.rig import chain_of
+from inercal.faces.studies.tables import Stated, check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -27,6 +27,7 @@ from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.imu.settings import (
     TILT,
     TURN,
+    AidedRig,
     AidedSettings,
     Disturbances,
     Exclusion,
@@ -40,43 +41,9 @@ from inercal.systems.imu.settings import (
     mounting_of,
 )
 
-SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
-
-class AidedTable(Strict):
-    """Reference-aided calibration: the table, and the instrument on it."""
-
-    rig: RigTable = Field(
-        default=RigTable(kind="two_axis_turntable"),
-        title="Rig",
-        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
-        "its azimuth unknown unless given",
-    )
-    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
-        default=("+x", "+y", "+z"),
-        examples=[["+x", "+y", "+z"]],
-        description="axes of the table, at zero angles, along which the instrument's x, y and z point",
-    )
-
-    @model_validator(mode="after")
-    def _right_handed(self) -> AidedTable:
-        """Refuse axes that make no frame."""
-        if mounting_of(self.mounting) is None:
-            raise refusal(
-                f"found the mounting {', '.join(self.mounting)}, expected three axes that make a right-handed frame"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _no_limits(self) -> AidedTable:
-        """Refuse what would change nothing."""
-        if self.rig.limits.model_fields_set:
-            raise refusal("found rig.limits, expected none: the angles are those of the record")
-        return self
-
-
-def aided_settings(table: AidedTable, where: object) -> AidedSettings:
-    """Put the table in SI.
+def aided_settings(table: AidedRig, where: object) -> AidedSettings:
+    """The table with its errors, in SI.
 
     Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
     """
@@ -204,7 +171,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
     )
-    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+    aided: Stated[AidedRig] = Field(
+        default=AidedRig(), title="Aided", description="options of the method aided"
+    )
 
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuTable:

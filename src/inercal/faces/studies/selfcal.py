@@ -21,7 +21,7 @@ from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
 from inercal.systems.selfcal.platform.rig import Base, Gimbals
 from inercal.systems.selfcal.settings import Filter, Gating, PlacedRecord, RecordOnBase, SelfcalSettings
-from inercal.systems.selfcal.stated import Goal, PriorDeviations, RigModel, TrueErrors, Truth
+from inercal.systems.selfcal.stated import Goal, PriorDeviations, RigModel, TrueCoefficients, TrueErrors
 
 
 class FilterTable(table_of(Gating), table_of(Filter)):  # type: ignore[misc]
@@ -45,7 +45,7 @@ class SelfcalStudyFile(table_of(SelfcalSettings), StudyFile):  # type: ignore[mi
     plan: CommandTable | None = Field(
         default=None, title="Plan", description="the path; a recording can do without"
     )
-    truth: Stated[Truth] | None = Field(
+    truth: Stated[TrueCoefficients] | None = Field(
         default=None, title="Truth", description="true coefficients, for simulations"
     )
     model: Stated[RigModel] = Field(

@@ -131,7 +131,7 @@ _TRUE = {
 }
 
 
-class Truth(keyed("TrueValues", _TRUE)):  # type: ignore[misc]
+class TrueCoefficients(keyed("TrueValues", _TRUE)):  # type: ignore[misc]
     """True coefficients of a simulation, in the product form, three of each group."""
 
     @property

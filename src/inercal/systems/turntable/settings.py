@@ -26,7 +26,7 @@ from inercal.foundation.keys import (
     within,
 )
 from inercal.foundation.rigs.chain import Chain
-from inercal.foundation.rigs.plans import Plan
+from inercal.foundation.rigs.plans import PLAN_NAME, Plan
 from inercal.foundation.units import Quantity, Unit
 
 JointName = Literal["phi1", "phi2", "phi3"]
@@ -132,7 +132,9 @@ class PositionDesign:
         "D: volume, A: mean variance of the coefficients; I: variance of prediction", "D"
     )
     table_errors: bool = option("judge with the errors of the table, or by the noise alone", True)
-    compare: tuple[str, ...] = ()
+    compare: tuple[str, ...] = option(
+        "named plans to set beside; all the table can take if absent", (), reads=PLAN_NAME
+    )
     constraint: Constraint | None = table(
         "only positions of low sensitivity; all if absent", None,
         example={"factors": ["dtheta_x"], "outputs": ["ax"], "below": 0.3}, name="sensitivity",
