@@ -199,8 +199,8 @@ WITHIN = {
     ),
     "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
     "turntable": (
-        "limits settings judged disturbances model weights second_order regression readings display sensitivity "
-        "positions rate steps task figures verbs system"
+        "limits settings judged model weights second_order regression readings display sensitivity sensitivity_maps "
+        "positions rate step_response step_test simulate task figures verbs system"
     ),
     "aoa": (
         "estimators limits alarm band layout disturbances motion settings angles reading fusion paper diagnosis "
@@ -297,10 +297,10 @@ def test_modules_can_be_read_in_one_go():
 
 #: what `tests/counts.py` counts; lowered when an issue is done
 CEILINGS = {
-    "names used across folders": 1451,
+    "names used across folders": 1449,
     "class names shared": 5,
     "constants outside Limits": 435,
-    "modules": 659,
+    "modules": 649,
 }
 
 

@@ -8,9 +8,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from inercal.faces.studies.commented import commented
 from inercal.faces.studies.load import put, unfilled
-from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.schema import commented, json_schema
 from inercal.faces.studies.text import toml, with_keys
 from inercal.faces.studies.tolerances import SYMBOLS
 from inercal.foundation.instruments.by_angle import CHANNELS
