@@ -202,7 +202,7 @@ def _value(typed: Any, hint: str) -> Any:
 def _type(key: Key, hint: Any, default: Any) -> Any:
     """The pydantic type of a key by that of its field: a list for a tuple, a table of one's own names for a mapping."""
     one: Any
-    if key.table:
+    if key.table and not key.reads:
         usual = default if is_dataclass(default) else None
         one = Annotated[settings_in(hint), _Reader(usual, key.words, key.example)]
     elif key.dimension == OUTPUT:
@@ -237,9 +237,7 @@ def _shaped(hint: Any, one: Any, row: bool) -> Any:
 
 def _plain(hint: Any) -> Any:
     """The type of a plain value as TOML has it: a file is a text, a tuple of any length a list; nothing is none."""
-    kinds = [kind for kind in get_args(hint) if kind is not NoneType]
-    if len(kinds) < len(get_args(hint)) and len(kinds) == 1:
-        return _plain(kinds[0])
+    hint = _given(hint)
     if "Path" in str(hint):
         return Annotated[str, Field(min_length=1)]
     if hint in (int, float, bool):
@@ -249,14 +247,21 @@ def _plain(hint: Any) -> Any:
     return hint
 
 
+def _given(hint: Any) -> Any:
+    """The hint without None, which TOML does not have."""
+    kinds = [kind for kind in get_args(hint) if kind is not NoneType]
+    return kinds[0] if len(kinds) == 1 and len(get_args(hint)) == 2 else hint
+
+
 def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool) -> Any:
     """Meaning, default and bounds of a field; an absent quantity is None, the settings know what it stands for."""
     default: Any = field.default if field.default_factory is MISSING else {}
     if default is MISSING and not needed:
         default = None
     plain = not (key.dimension or key.table)
+    hint = _given(hint)
     listed = get_origin(hint) is tuple
-    long = listed or hint in (str, str | None)
+    long = listed or hint is str
     absent = (
         ...
         if default is MISSING

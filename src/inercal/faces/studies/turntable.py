@@ -10,11 +10,11 @@ from typing import Any
 from pydantic import Field
 
 from inercal.faces.studies.common import StudyFile, site_on_earth
-from inercal.faces.studies.instrument import InstrumentTable, instrument_of
+from inercal.faces.studies.instrument import instrument_of
 from inercal.faces.studies.positions import compared, grid_of, plan_of
 from inercal.faces.studies.rig import chain_of, limits_of
 from inercal.faces.studies.tables import Stated, settings_of, table_of
-from inercal.faces.studies.tolerances import CostsTable, WantedTable, tolerances_of
+from inercal.faces.studies.tolerances import CostsTable, tolerances_of
 from inercal.foundation._toml import check
 from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.keys import OUTPUT, keys_of
@@ -22,7 +22,13 @@ from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.rigs.plans import Grid, StatedPositions
 from inercal.foundation.rigs.stated import StatedRig
 from inercal.foundation.units import Unit, parse_quantity
-from inercal.systems.turntable.settings import Disturbances, PositionDesign, TurntableSettings
+from inercal.systems.turntable.settings import (
+    Disturbances,
+    Instrument,
+    PositionDesign,
+    TurntableSettings,
+    WantedOfTable,
+)
 
 
 class DesignTable(table_of(PositionDesign)):  # type: ignore[misc]
@@ -43,8 +49,8 @@ class TurntableStudyFile(table_of(TurntableSettings), StudyFile):  # type: ignor
     positions: Stated[StatedPositions] = Field(
         default=StatedPositions(), title="Positions", description="where to stop; a grid of 10 deg if absent"
     )
-    instrument: InstrumentTable = Field(
-        default=InstrumentTable(), title="Instrument", description="the instrument on the table"
+    instrument: table_of(Instrument) = Field(  # type: ignore[valid-type]
+        default=table_of(Instrument)(), title="Instrument", description="the instrument on the table"
     )
     design: DesignTable = Field(default=DesignTable(), title="Design", description="the search for positions")
     disturbances: table_of(Disturbances) = Field(  # type: ignore[valid-type]
@@ -52,7 +58,9 @@ class TurntableStudyFile(table_of(TurntableSettings), StudyFile):  # type: ignor
         title="Disturbances",
         description="what a simulation adds to the model",
     )
-    goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
+    goal: Stated[WantedOfTable] = Field(
+        default=WantedOfTable(), title="Goal", description="wanted uncertainties"
+    )
     cost: CostsTable = Field(
         default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
     )
