@@ -234,7 +234,7 @@ def _plain_type(found: Schema, definitions: Mapping[str, Schema]) -> str:
 
 def _literal(value: object) -> str:
     """A value as TOML writes it."""
-    from inercal.faces.studies.commented import toml
+    from inercal.faces.studies.schema import toml
 
     return code(toml(value))
 

@@ -199,16 +199,16 @@ WITHIN = {
     ),
     "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
     "turntable": (
-        "limits settings judged disturbances model weights second_order regression readings display sensitivity "
-        "positions rate steps task figures verbs system"
+        "limits settings judged model weights second_order regression readings display sensitivity sensitivity_maps "
+        "positions rate step_response step_test simulate task figures verbs system"
     ),
     "aoa": (
         "estimators limits alarm band layout disturbances motion settings angles reading fusion paper diagnosis "
         "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (
-        "estimators limits platform disturbances settings still_joints filters before diagnosis find_base monte_carlo "
-        "reading result task several figures verbs system"
+        "estimators limits platform disturbances settings stated still_joints filters before diagnosis find_base "
+        "monte_carlo reading result task several figures verbs system"
     ),
 }
 

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth
+from new_studies import table_read
 
-from inercal.faces.studies.aided import AidedTable
-from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
@@ -20,7 +19,7 @@ from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.imu.aided.calibration import calibrate_aided
 from inercal.systems.imu.aided.simulate import rests_of, simulate
-from inercal.systems.imu.settings import AidedSettings, ImuSettings
+from inercal.systems.imu.settings import AidedRig, AidedSettings, ImuSettings
 
 CHAIN = turntable("two_axis_turntable", None)
 ACC, GYRO = ("acc_x", "acc_y", "acc_z"), ("gyro_x", "gyro_y", "gyro_z")
@@ -253,7 +252,7 @@ def test_a_coarse_gyro_cannot_contradict_an_azimuth_nor_is_it_hurt():
 def test_limits_of_the_axes_are_refused_for_they_would_change_nothing():
     rig = {"kind": "two_axis_turntable", "limits": {"phi1": ["-90 deg", "90 deg"]}}
     with pytest.raises(StudyError, match=r"found rig\.limits, expected none"):
-        check(AidedTable, {"rig": rig}, "study", StudyError)
+        table_read(AidedRig, {"rig": rig})
 
 
 def with_squares(sound, k2):

@@ -8,7 +8,7 @@ import pytest
 from turntable_studies import DEG_H, LATITUDE, WHEEL_X, study
 
 from inercal.foundation.geometry.earth import Site
-from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.instruments.by_angle import ChannelModel
 from inercal.foundation.rigs.plans import grid
 from inercal.systems.turntable.positions.examination import Examination, examine, f_test
 from inercal.systems.turntable.positions.faults import approach

@@ -189,7 +189,7 @@ def sensitivity(
         output.say(analysed.note)
 
     def maps(path: Path) -> None:
-        from inercal.systems.turntable.sensitivity.maps import write_maps
+        from inercal.systems.turntable.sensitivity_maps import write_maps
 
         write_maps(analysed, path)
 

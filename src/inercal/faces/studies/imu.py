@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from inercal.faces.studies.aided import AidedTable, aided_settings
 from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.tables import check_kind, settings_of, table_of
+from inercal.faces.studies.rig import chain_of
+from inercal.faces.studies.tables import Stated, check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -27,6 +27,8 @@ from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.imu.settings import (
     TILT,
     TURN,
+    AidedRig,
+    AidedSettings,
     Disturbances,
     Exclusion,
     ImuSettings,
@@ -36,7 +38,19 @@ from inercal.systems.imu.settings import (
     Method,
     SectionsSettings,
     Simulation,
+    mounting_of,
 )
+
+
+def aided_settings(table: AidedRig, where: object) -> AidedSettings:
+    """The table with its errors, in SI.
+
+    Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
+    """
+    azimuth = table.rig.base.azimuth
+    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
+    return AidedSettings(chain, None if azimuth is None else azimuth.u)
+
 
 #: keys beside those of the settings that not all methods heed -> those that do
 _METHODS = {
@@ -189,7 +203,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
     )
-    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+    aided: Stated[AidedRig] = Field(
+        default=AidedRig(), title="Aided", description="options of the method aided"
+    )
 
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuTable:

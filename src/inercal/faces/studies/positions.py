@@ -2,100 +2,30 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
-from inercal.faces.studies.fields import refusal
-from inercal.faces.studies.rig import Angle, Limits
-from inercal.faces.studies.starting import POSITIONS
-from inercal.foundation._toml import Strict
+from inercal.faces.studies.rig import JOINTS, Limits
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.criteria import within
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.read import read
 from inercal.foundation.rigs.chain import Chain
-from inercal.foundation.rigs.plans import NAMED, Plan, grid, listed, named
+from inercal.foundation.rigs.plans import NAMED, Grid, Plan, StatedPositions, grid, listed, named
 from inercal.foundation.units import shown
 
 MOST = 200_000
 """Positions of a grid that fit into memory with all their indices."""
 
-_JOINTS = ("phi1", "phi2", "phi3")
-
-Count = Annotated[StrictInt, Field(ge=1)]
-
-
-def _known_plan(name: object) -> object:
-    """Refuse a name that no plan has, with the nearest one."""
-    if isinstance(name, str) and name not in NAMED:
-        near = difflib.get_close_matches(name[:80], NAMED, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"expected {', '.join(NAMED[:-1])} or {NAMED[-1]}"
-        raise refusal(f"found {shown(name)}, {hint}")
-    return name
-
-
-PlanName = Annotated[str, BeforeValidator(_known_plan), Field(json_schema_extra={"enum": list(NAMED)})]
-
-
-class GridTable(Strict):
-    """Combinations of evenly spaced angles over full circles, the outer axis slowest."""
-
-    phi1: Count = Field(description="number of outer angles", examples=[36])
-    phi2: Count | None = Field(
-        default=None, description="number of angles of the next axis, where there is one", examples=[36]
-    )
-    phi3: Count | None = Field(default=None, description="number of inner angles of a three-axis table")
-    offset: Literal["half", "none"] = Field(
-        default="half", description="start half a step from zero, clear of singular attitudes, or at zero"
-    )
-
-
-class PositionsTable(Strict):
-    """The positions to analyse, simulate or calibrate at: one of four."""
-
-    grid: GridTable | None = Field(
-        default=None,
-        title="Grid",
-        description="numbers of evenly spaced angles; offset none starts at zero",
-        examples=[{"phi1": 36, "phi2": 36, "offset": "half"}],
-    )
-    plan: PlanName | None = Field(default=None, description="instead: a plan of a two-axis table by its name")
-    list_: list[list[Angle]] | None = Field(
-        default=None,
-        alias="list",
-        min_length=1,
-        description="instead: the angles of each position",
-        examples=[[["0 deg", "45 deg"]]],
-    )
-    file: str | None = Field(
-        default=None,
-        min_length=1,
-        description="instead: a CSV beside the study with the header phi1 [deg],phi2 [deg] and a position a row",
-        examples=["positions.csv"],
-    )
-
-    @model_validator(mode="after")
-    def _one(self) -> PositionsTable:
-        """Refuse two ways at once."""
-        ways = dict(zip(POSITIONS, (self.grid, self.plan, self.list_, self.file), strict=True))
-        given = [name for name, way in ways.items() if way is not None]
-        if len(given) > 1:
-            raise refusal(f"found {' and '.join(given)}, expected one of them")
-        return self
-
-
 #: the grid where a study gives none, by number of joints
 _USUAL: Mapping[int, tuple[int, ...]] = {1: (36,), 2: (36, 36), 3: (12, 12, 12)}
 
 
-def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) -> Plan:
+def plan_of(table: StatedPositions, chain: Chain, limits: Limits, where: object) -> Plan:
     """The positions of a study [rad]; those of a grid that the axes reach.
 
     Raises `StudyError` for a plan that is not for this table, a list or a file that does not fit its joints, a file
@@ -103,8 +33,9 @@ def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) 
     """
     if table.plan is not None:
         key, plan = f"positions.plan {table.plan}", _named(table.plan, chain, "positions.plan", where)
-    elif table.list_ is not None:
-        key, plan = "positions.list", listed(_rows(table.list_, chain, where))
+    elif table.rows:
+        _check_rows(table.rows, chain, where)
+        key, plan = "positions.list", listed(table.rows)
     elif table.file is not None:
         key, plan = f"positions.file {shown(table.file)}", _of_file(table.file, chain, where)
     else:
@@ -121,7 +52,7 @@ def plan_of(table: PositionsTable, chain: Chain, limits: Limits, where: object) 
 
 
 def grid_of(
-    table: GridTable | None,
+    table: Grid | None,
     chain: Chain,
     limits: Limits,
     key: str,
@@ -134,11 +65,10 @@ def grid_of(
     """
     counts = _USUAL[len(chain.joints)]
     if table is not None:
-        by_joint = {"phi1": table.phi1, "phi2": table.phi2, "phi3": table.phi3}
-        given = {joint: count for joint, count in by_joint.items() if count is not None}
-        if tuple(given) != chain.joints:
-            raise StudyError(where, f"{key}: found {', '.join(given)}, expected {', '.join(chain.joints)}")
-        counts, half = tuple(given.values()), table.offset == "half"
+        joints = tuple(table.counts)
+        if joints != chain.joints:
+            raise StudyError(where, f"{key}: found {', '.join(joints)}, expected {', '.join(chain.joints)}")
+        counts, half = tuple(table.counts.values()), table.offset == "half"
     if math.prod(counts) > MOST:
         raise StudyError(where, f"{key}: found {math.prod(counts)} positions, expected at most {MOST}")
     whole = grid(counts, half)
@@ -186,15 +116,14 @@ def _named(name: str, chain: Chain, key: str, where: object) -> Plan:
     return named(name)
 
 
-def _rows(rows: Sequence[Sequence[Any]], chain: Chain, where: object) -> list[list[float]]:
-    """The angles of a list [rad], as many as there are joints."""
+def _check_rows(rows: Sequence[Sequence[float]], chain: Chain, where: object) -> None:
+    """Refuse positions with more or fewer angles than there are joints."""
     for k, row in enumerate(rows):
         if len(row) != len(chain.joints):
             raise StudyError(
                 where,
                 f"positions.list.{k}: found {len(row)} angles, expected {', '.join(chain.joints)}",
             )
-    return [[angle.value for angle in row] for row in rows]
 
 
 def _of_file(name: str, chain: Chain, where: object) -> Plan:
@@ -208,7 +137,7 @@ def _of_file(name: str, chain: Chain, where: object) -> Plan:
         )
     try:
         record = read(path)
-        angles = {column.name: column.si() for column in record.columns.values() if column.name in _JOINTS}
+        angles = {column.name: column.si() for column in record.columns.values() if column.name in JOINTS}
     except InputError as error:
         raise StudyError(where, f"positions.file: {error} (its header should be {head})") from error
     if tuple(sorted(angles)) != chain.joints:

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from inercal.faces.studies.commented import commented
 from inercal.faces.studies.common import ConditionsTable
 from inercal.faces.studies.fields import refusal
 from inercal.faces.studies.laboratory import (
@@ -23,7 +22,7 @@ from inercal.faces.studies.laboratory import (
     Tolerances,
 )
 from inercal.faces.studies.load import put
-from inercal.faces.studies.schema import TomlSchema
+from inercal.faces.studies.schema import TomlSchema, commented
 from inercal.faces.studies.starting import UNKNOWN
 from inercal.foundation._toml import Strict, check, read_toml
 from inercal.foundation.errors import InputError

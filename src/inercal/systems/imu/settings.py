@@ -7,14 +7,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
-from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, within
+from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, table, within
 from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.rigs.stated import StatedRig
 from inercal.foundation.units import Quantity
 
 MASKED = ("saturation", "no_data")
@@ -63,6 +65,38 @@ class FerrarisSettings:
         bounds=TILT,
     )  # fmt: skip
     sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
+
+
+SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+@dataclass(frozen=True)
+class AidedRig:
+    """Reference-aided calibration: the table, and the instrument on it."""
+
+    stated_rig: StatedRig | None = table(
+        "the table, as in a study of a turntable; of two axes and without errors if absent, its azimuth unknown "
+        "unless given", None, name="rig",
+    )  # fmt: skip
+    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = option(
+        "axes of the table, at zero angles, along which the instrument's x, y and z point", ("+x", "+y", "+z"),
+        example=["+x", "+y", "+z"],
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse axes that make no frame, and ranges, which would change nothing."""
+        if mounting_of(self.mounting) is None:
+            axes = ", ".join(self.mounting)
+            raise InputError(
+                "", f"found the mounting {axes}, expected three axes that make a right-handed frame"
+            )
+        if self.rig.limits.stated:
+            raise InputError("", "found rig.limits, expected none: the angles are those of the record")
+
+    @property
+    def rig(self) -> StatedRig:
+        """The table; a plain one of two axes where none is stated."""
+        return self.stated_rig or StatedRig("two_axis_turntable")
 
 
 @dataclass(frozen=True)

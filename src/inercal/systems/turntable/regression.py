@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import Identifiability, few_terms, identify, in_words
-from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.instruments.by_angle import ChannelModel
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel
 from inercal.systems.turntable.second_order import SecondOrder, second_order

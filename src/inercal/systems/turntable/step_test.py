@@ -29,7 +29,7 @@ from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term
 from inercal.systems.turntable.readings import Readings, readings
 from inercal.systems.turntable.regression import FLOOR
 from inercal.systems.turntable.settings import TurntableSettings
-from inercal.systems.turntable.steps.response import Response, Tilted, respond, senses
+from inercal.systems.turntable.step_response import Response, Tilted, respond, senses
 
 MODEL = Formula(
     r"$y = K_0 + K_1 (x - d + s K_{\mathrm{hyst}}/2) + D t$, $D$ the drift, $x$ the specific force along the axis, "

@@ -12,7 +12,7 @@ import numpy as np
 
 from inercal.foundation._files import write_bytes
 from inercal.foundation.arrays import Array
-from inercal.systems.turntable.sensitivity.analysis import Analysed
+from inercal.systems.turntable.sensitivity import Analysed
 
 #: name -> dimensions and what it is
 _MAPS: dict[str, tuple[tuple[str, ...], str]] = {
