@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, TypeAlias
 from inercal.faces.report.html import Picture, render
 from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.aided.figures import pictures as of_aided
-from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
-from inercal.systems.imu.ferraris.figures import pictures as of_ferraris
 from inercal.systems.imu.known_rates.calibration import KnownRatesCalibration
 from inercal.systems.imu.known_rates.figures import pictures as of_known_rates
 from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
 
     AnyCalibration: TypeAlias = (
         MultipositionCalibration
-        | FerrarisCalibration
         | AidedCalibration
         | MeansCalibration
         | KnownRatesCalibration
@@ -41,8 +38,6 @@ def main(calibration: AnyCalibration) -> Picture:
 def pictures(calibration: AnyCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first."""
     match calibration:
-        case FerrarisCalibration():
-            return of_ferraris(calibration)
         case AidedCalibration():
             return of_aided(calibration)
         case MeansCalibration():

@@ -26,7 +26,6 @@ from inercal.systems.imu.settings import (
 
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
-    from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
     from inercal.systems.imu.known_rates.calibration import KnownRatesCalibration
     from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
     from inercal.systems.imu.means.calibration import MeansCalibration
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
     Calibrated = (
         MultipositionCalibration
-        | FerrarisCalibration
         | AidedCalibration
         | MeansCalibration
         | KnownRatesCalibration

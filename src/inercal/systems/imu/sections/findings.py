@@ -91,9 +91,11 @@ def _contradictions(found: SectionCalibration) -> Iterator[Finding]:
 
 
 def _signs(found: SectionCalibration) -> Iterator[Finding]:
-    """Negative scale factors: exchanged sides leave no other trace."""
+    """Scale factors of the wrong sign: exchanged sides leave no other trace."""
+    gyro = found.problem.priors.gyro_scale
+    backward = gyro is not None and gyro.median < 0.0
     for name, value in zip(found.names, found.x, strict=True):
-        if name.startswith(("K1_", "S_")) and value < 0.0:
+        if name.startswith(("K1_", "S_")) and (value < 0.0) != (backward and name.startswith("S_")):
             sensor, axis = ("acc" if name.startswith("K1") else "gyro"), name[-1]
             yield Finding(
                 "sign_suspect",

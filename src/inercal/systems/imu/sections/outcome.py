@@ -77,30 +77,51 @@ def calibrate_from_sections(
     progress("reading the sections")
     named = by_file(records)
     refuse_samples(named)
+    found = of_proposal(_proposal(named, options), records, settings, options, progress=progress)
+    return replace(found, estimate=timed(found.estimate, clock))
+
+
+def of_proposal(
+    proposal: Proposal,
+    records: Sequence[Record],
+    settings: ImuSettings,
+    options: SectionsSettings = SectionsSettings(),  # noqa: B008  (frozen)
+    *,
+    backward: bool = False,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CalibrationFromSections:
+    """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule.
+
+    Raises `InputError` for recordings in several units.
+    """
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    proposal = _proposal(named, options)
     sections = tuple(_placed(section, options) for section in proposal.sections)
     findings = (*_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
-    bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    none: Mapping[str, Any] = {"method": "sections", "sections": []}
+
+    def without(status: Status, text: str) -> CalibrationFromSections:
+        if proposal.questions:
+            status, text = Status.INCONSISTENT, proposal.questions[0].message
+        basis = studied(COMMAND, settings, sources, MODEL, REFERENCES)
+        none: Mapping[str, Any] = {"method": "sections", "sections": []}
+        return CalibrationFromSections(
+            Estimate.without(basis, status, text, findings=findings, result=none), sections
+        )
+
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(
-            timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
+            _by_swing(proposal.swings[0], settings, records, units, findings), sections
         )
     if not sections:
         text = "found no section that can be read: state them in a table, imu.sections"
-        estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
-    priors = _priors(settings, units)
+        return without(Status.TOO_FEW_INTERVALS, text)
+    priors = _priors(settings, units, backward=backward)
     lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
         cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
-        text = f"the sections leave {what} open: add {cure}"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
+        return without(Status.UNOBSERVABLE, f"the sections leave {what} open: add {cure}")
     progress("fitting the sections")
     try:
         if proposal.moves:
@@ -110,19 +131,21 @@ def calibrate_from_sections(
             found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
+        return without(Status.UNOBSERVABLE, text)
     estimate = _estimate(found, settings, records, units, proposal, findings)
-    return CalibrationFromSections(timed(estimate, clock), sections, found)
+    return CalibrationFromSections(estimate, sections, found)
 
 
-def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None], *, backward: bool = False) -> Priors:
     """Priors by what the study says of the site, the clock and the instrument."""
+    gyro = _scale(units["gyro"])
+    if backward:
+        gyro = Size(-1.0, math.inf) if gyro is None else gyro._replace(median=-gyro.median)
     return Priors(
         settings.site,
         clock_u=settings.time_base_u,
         acc_scale=_scale(units["acc"]),
-        gyro_scale=_scale(units["gyro"]),
+        gyro_scale=gyro,
         k2=math.inf if settings.k2 else settings.k2_u,
     )
 
