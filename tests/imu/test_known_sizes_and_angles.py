@@ -287,14 +287,9 @@ def test_turns_of_a_real_unit_give_what_ferraris_gives():
     """The turns of a session by hand, each with the rest around it, and the gyro alone."""
     record, settings = shipped("ferraris-si")
     whole = calibrate(record, settings)
-    begin = float(record["gyro_x"].t[0])
-    sections = {row["section"]: row for row in whole.estimate.result["sections"]}
-    records = [
-        record.between(
-            sections[f"{axis}_rot"]["start_s"] - begin - 2.0, sections[f"{axis}_rot"]["end_s"] - begin + 2.0
-        )
-        for axis in "xyz"
-    ]
+    t = record["gyro_x"].t
+    ends = [settings.method.sections[f"{axis}_rot"] for axis in "xyz"]
+    records = [record.between(t[a] - t[0] - 2.0, t[b] - t[0] + 2.0) for a, b in ends]
     turn = settings.method.turn
     options = KnownTurnsSettings((turn,) * 3, (np.radians(2.0),) * 3, np.radians(0.5))
     alone = calibrate_files(records, ImuSettings(settings.site, method=options)).estimate

@@ -160,13 +160,15 @@ def test_k2_that_cannot_be_is_refused(imu, sentence):
     assert sentence in caught.value.message
 
 
-def test_k2_of_six_positions_is_all_in_k0():
-    """Closed form: a reading of 1 g up and one of 1 g down have the mean K0 + K1 K2 g^2."""
+def test_k2_of_six_positions_is_in_k0():
+    """A reading of 1 g up and one of 1 g down have the mean K0 + K1 K2 g^2; the other four sides tell K0 as well, and
+    better where they were square, so that this is the most that K2 can do."""
     record, settings = shipped("ferraris-si")
     size = 1e-5
     exact, stated = (calibrate(record, replace(settings, k2_u=u)).estimate for u in (0.0, size))
     g = settings.site.gravity
     for axis in "xyz":
         more = np.sqrt(stated[f"K0_{axis}"].u ** 2 - exact[f"K0_{axis}"].u ** 2)
-        assert more == pytest.approx(stated[f"K1_{axis}"].value * size * g**2, rel=1e-3)
-        assert stated[f"K1_{axis}"].u == pytest.approx(exact[f"K1_{axis}"].u, rel=1e-6)
+        most = stated[f"K1_{axis}"].value * size * g**2
+        assert 0.9 * most < more < 1.001 * most
+        assert stated[f"K1_{axis}"].u == pytest.approx(exact[f"K1_{axis}"].u, rel=1e-3)

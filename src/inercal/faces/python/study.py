@@ -178,8 +178,10 @@ def _of_keys(kind: str, keys: Mapping[str, Any]) -> Any:
 def _in_tables(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """The keywords with those in their tables that stand alone."""
     tables: dict[str, Any] = {}
+    whole = SYSTEMS[kind].study_file().model_fields
     for key, value in keys.items():
-        table = "site" if key in _SITE else "" if isinstance(value, Mapping) else SYSTEMS[kind].table
+        of_file = isinstance(value, Mapping) and (key in whole or not SYSTEMS[kind].table)
+        table = "site" if key in _SITE else "" if of_file else SYSTEMS[kind].table
         if not table or key == "schema":
             tables[key] = {**tables.get(key, {}), **value} if isinstance(value, Mapping) else value
             continue

@@ -31,7 +31,8 @@ def implausible(
     ----------
     names : (p,)
     scales : mapping
-        What each scale factor should be, by name; 0 where nobody knows: then its u and its sign alone are judged.
+        What each scale factor should be, by name; 0 where nobody knows, -0 of an output that counts backward: then its
+        u and its sign alone are judged.
     angles : collection of str
         Names of misalignments [rad], judged where all scale factors can be.
     gravity : mapping
@@ -63,7 +64,7 @@ def _of_scales(rows: Sequence[tuple[str, float, float]], scales: Mapping[str, fl
     for name, value, u in rows:
         about = scales[name]
         size = abs(about) or abs(value)
-        over = value / about if about else math.copysign(1.0, value)
+        over = value / about if about else math.copysign(1.0, value) * math.copysign(1.0, about)
         if u > LIMITS.scale_off * max(size, abs(value)):
             text = f"{name} = {value:.2g} ± {2.0 * u:.2g}: the recording fixes no scale."
             action = "Turn or tilt this axis further, both ways, within the range of the sensor."

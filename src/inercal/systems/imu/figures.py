@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, TypeAlias
 from inercal.faces.report.html import Picture, render
 from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.aided.figures import pictures as of_aided
-from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
-from inercal.systems.imu.ferraris.figures import pictures as of_ferraris
 from inercal.systems.imu.multiposition.figures import pictures as of_multiposition
 from inercal.systems.imu.sections.figures import pictures as of_sections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
@@ -16,9 +14,7 @@ from inercal.systems.imu.sections.outcome import CalibrationFromSections
 if TYPE_CHECKING:
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
 
-    AnyCalibration: TypeAlias = (
-        MultipositionCalibration | FerrarisCalibration | AidedCalibration | CalibrationFromSections
-    )
+    AnyCalibration: TypeAlias = MultipositionCalibration | AidedCalibration | CalibrationFromSections
 
 
 def main(calibration: AnyCalibration) -> Picture:
@@ -29,8 +25,6 @@ def main(calibration: AnyCalibration) -> Picture:
 def pictures(calibration: AnyCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first."""
     match calibration:
-        case FerrarisCalibration():
-            return of_ferraris(calibration)
         case AidedCalibration():
             return of_aided(calibration)
         case CalibrationFromSections():

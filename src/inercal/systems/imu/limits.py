@@ -167,9 +167,6 @@ class Limits:
     faint_response: float = 0.3
     """Least part of an output's largest response that a position or a turn has to show on its axis."""
 
-    position_tilt: float = math.radians(10.0)
-    """Scatter of the positions [rad] beyond which the sections can hardly be what their names say."""
-
     # Ferraris: choice of the turns
 
     turn_deviation: float = 0.25

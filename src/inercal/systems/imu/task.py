@@ -26,11 +26,10 @@ from inercal.systems.imu.settings import (
 
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
-    from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
     from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-    Calibrated = MultipositionCalibration | FerrarisCalibration | AidedCalibration | CalibrationFromSections
+    Calibrated = MultipositionCalibration | AidedCalibration | CalibrationFromSections
 
 
 def in_order(settings: ImuSettings) -> bool:

@@ -17,7 +17,7 @@ from inercal.systems.imu.sections.calibration import SectionCalibration, gross
 from inercal.systems.imu.sections.cutting.checks import direction
 from inercal.systems.imu.sections.judged import judged_sections
 from inercal.systems.imu.sections.limits import LIMITS
-from inercal.systems.imu.sections.priors import Priors
+from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.unknowns import G
 
 _WORDS = {
@@ -94,13 +94,18 @@ def _contradictions(found: SectionCalibration) -> Iterator[Finding]:
         )
 
 
+def _expected(size: Size | None) -> float:
+    """A scale factor beforehand; where its size is not known 0, by its sign."""
+    if size is None:
+        return 0.0
+    return size.median if math.isfinite(size.spread) else math.copysign(0.0, size.median)
+
+
 def _values(found: SectionCalibration, priors: Priors) -> Iterator[Finding]:
     """Values that cannot be: exchanged sides and other units leave no other trace."""
     sizes = {"K1": priors.acc_scale, "S": priors.gyro_scale}
     scales = {
-        name: 0.0 if (size := sizes[head]) is None else size.median
-        for name in found.names
-        if (head := name.rpartition("_")[0]) in sizes
+        name: _expected(sizes[head]) for name in found.names if (head := name.rpartition("_")[0]) in sizes
     }
     angles = [name for name in found.names if name.startswith(("M_", "T_"))]
     g = priors.site.gravity

@@ -64,7 +64,8 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     linear = Linear(problem, point.x, rows(problem, point))
     z = np.array([np.log(size.median) for size in problem.sizes.values()])
     try:
-        covariance = linear.at(z).covariance
+        with np.errstate(divide="ignore", invalid="ignore"):  # what nothing tells is infinite
+            covariance = linear.at(z).covariance
     except LinAlgError:
         covariance = np.full((len(linear.shared),) * 2, np.inf)
     flat = [
@@ -77,11 +78,18 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
 
 
 def _full_scale(problem: Problem, p: int, x: Array) -> float:
-    """The largest output of the triad of a bias, that by g-sensitivity among them; the size of a scale factor by the
-    unknowns ``x`` (p,); 1 for any other coefficient."""
+    """The largest output of the triad of a bias, that by g-sensitivity among them; of a scale factor the largest output
+    over the largest input, or that by the unknowns ``x`` (p,); 1 for any other coefficient."""
     name, y = COEFFICIENTS[p], problem.readings.y
     if name.startswith("K0"):
         return float(np.nanmax(np.abs(y[:, :2])))
+    if name.startswith("K1"):
+        return max(float(np.nanmax(np.abs(y[:, :2]))) / problem.priors.site.gravity, 1e-12)
+    if name.startswith("S") and np.any(problem.readings.rate != 0.0):
+        moving = problem.readings.rate != 0.0
+        return max(
+            float(np.nanmax(np.abs(y[moving, 2]) / np.abs(problem.readings.rate[moving, None]))), 1e-12
+        )
     if name.startswith("D_F"):
         drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
         return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)

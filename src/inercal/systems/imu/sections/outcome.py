@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any
@@ -88,32 +88,69 @@ def calibrate_from_sections(
     named, temperature = by_file(records), recorded_temperature(records[0])
     if isinstance(options, SectionsSettings):
         refuse_samples(named)
-        proposal = _proposal(named, options)
-        sections = tuple(placed(section, options) for section in proposal.sections)
-        method, notes = "sections", proposal.notes
+        found = of_proposal(
+            _proposal(named, options), records, settings, options, temperature=temperature, progress=progress
+        )
     else:
         named = {name: alone(record, options) for name, record in named.items()}
         refuse_samples(named)
         proposal = proposal_of(named, options, settings.exclude)
-        sections, method = proposal.sections, word_of(options)
-        notes = (*proposal.notes, *gyro_of_means(records, options))
-    records = list(named.values())
+        proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
+        judged = trend_findings if isinstance(options, KnownRatesSettings) else _nothing_more
+        kept = list(named.values())
+        found = of_proposal(
+            proposal, kept, settings, temperature=temperature, judged=judged, progress=progress
+        )
+        result = {**found.estimate.result, "method": word_of(options)}
+        found = replace(found, estimate=replace(found.estimate, result=result))
+    return replace(found, estimate=timed(found.estimate, clock))
+
+
+def _nothing_more(_: SectionCalibration) -> Iterable[Finding]:
+    """No findings of a method of its own."""
+    return ()
+
+
+def of_proposal(
+    proposal: Proposal,
+    records: Sequence[Record],
+    settings: ImuSettings,
+    options: SectionsSettings = SectionsSettings(),  # noqa: B008  (frozen)
+    *,
+    backward: bool = False,
+    temperature: Quantity | None = None,
+    judged: Callable[[SectionCalibration], Iterable[Finding]] = _nothing_more,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CalibrationFromSections:
+    """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule,
+    ``temperature`` that of the recording, and ``judged`` finds what only some protocols ask.
+
+    Raises `InputError` for recordings in several units.
+    """
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    findings = (*_of_records(records), *proposal.questions, *notes)
+    sections = tuple(placed(section, options) for section in proposal.sections)
+    findings = (*_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
-    bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    none: Mapping[str, Any] = {"method": method, "sections": []}
+
+    def without(status: Status, text: str) -> CalibrationFromSections:
+        if proposal.questions:
+            status, text = Status.INCONSISTENT, proposal.questions[0].message
+        basis = studied(COMMAND, settings, sources, MODEL, REFERENCES)
+        none: Mapping[str, Any] = {"method": "sections", "sections": []}
+        return CalibrationFromSections(
+            Estimate.without(basis, status, text, findings=findings, result=none), sections
+        )
+
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(
-            timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
+            _by_swing(proposal.swings[0], settings, records, units, findings), sections
         )
     if not sections:
         why = "; ".join(f"{name} {reason}" for name, reason in proposal.unused.items())
         text = why or "found no section that can be read: state them in a table, imu.sections"
-        estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
-    priors = _priors(settings, units)
+        return without(Status.TOO_FEW_INTERVALS, text)
+    priors = _priors(settings, units, backward=backward)
     lacking = missing(sections, priors)
     if lacking is not None and all(name.startswith("S_") for name in lacking.terms):
         # rests show too little of Earth's rate: moves tell the scale of the gyro, or nothing does
@@ -121,9 +158,7 @@ def calibrate_from_sections(
         lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
-        text = f"the sections leave {what} open: add {lacking.cure}"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
+        return without(Status.UNOBSERVABLE, f"the sections leave {what} open: add {lacking.cure}")
     progress("fitting the sections")
     try:
         if proposal.moves:
@@ -133,14 +168,10 @@ def calibrate_from_sections(
             found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
-    findings = (*findings, *findings_of(found, priors), *two_clocks(found, named))
-    if isinstance(options, KnownRatesSettings):
-        findings = (*findings, *trend_findings(found))
+        return without(Status.UNOBSERVABLE, text)
+    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)), *judged(found))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
-    estimate = replace(estimate, result={**estimate.result, "method": method})
-    return CalibrationFromSections(timed(estimate, clock), sections, found)
+    return CalibrationFromSections(estimate, sections, found)
 
 
 def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> Priors:
@@ -160,9 +191,12 @@ def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> P
     )
 
 
-def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None], *, backward: bool = False) -> Priors:
     """Priors by the study and the units of the outputs."""
-    return stated_priors(settings, {sensor: _scale(triad) for sensor, triad in units.items()})
+    acc, gyro = (_scale(units[sensor]) for sensor in ("acc", "gyro"))
+    if backward:
+        gyro = Size(-1.0, math.inf) if gyro is None else gyro._replace(median=-gyro.median)
+    return stated_priors(settings, {"acc": acc, "gyro": gyro})
 
 
 def _by_swing(

@@ -20,12 +20,16 @@ from inercal.systems.imu.sections.section import Section
 _LETTERS = "xyz"
 
 
-def contradictions(sections: Sequence[Section], gyro_scale: float | None) -> tuple[Finding, ...]:
+def contradictions(
+    sections: Sequence[Section], gyro_scale: float | None, *, backward: bool = False
+) -> tuple[Finding, ...]:
     """Findings about sections in which something else was read than is said of them.
 
-    ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other.
+    ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other. One that
+    is known to count ``backward`` has the opposite sign.
     """
-    return (*_of_rests(sections), *_turning_rests(sections), *_of_rotations(sections, gyro_scale))
+    sense = -1.0 if backward else 1.0
+    return (*_of_rests(sections), *_turning_rests(sections), *_of_rotations(sections, gyro_scale, sense))
 
 
 def direction(vector: Array) -> str:
@@ -151,7 +155,7 @@ def _elsewhere(section: Section, force: Array) -> Finding:
     )
 
 
-def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iterator[Finding]:
+def _of_rotations(sections: Sequence[Section], gyro_scale: float | None, sense: float) -> Iterator[Finding]:
     """Contradictions of rates and turns."""
     turning = [
         one
@@ -183,7 +187,7 @@ def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iter
                 harm=EVERYTHING,
             )
         else:
-            gains.append((one, float(off @ one.axis) / _rate(one)))
+            gains.append((one, sense * float(off @ one.axis) / _rate(one)))
     yield from _of_gains(gains, gyro_scale)
 
 
@@ -210,7 +214,7 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
                 "sign_suspect",
                 f"{one.name} turns the other way than its {what} says, about {_letter(one)}.",
                 one.where,
-                action=f"Correct the sign of its `{what}` or `axis`.",
+                action=f"Correct the sign of its `{what}` or `axis`, or that of gyro_{_letter(one)} in the map.",
                 harm=EVERYTHING,
             )
         elif abs(gain / usual - 1.0) > LIMITS.rate_miss:

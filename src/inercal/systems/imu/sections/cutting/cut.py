@@ -1,4 +1,7 @@
-"""Sections from stretches of recordings: means, the noise of these, and the motion of a turn from rest to rest."""
+"""Sections from stretches of recordings: means, the noise of these, and the motion of a turn from rest to rest.
+
+A turn whose stretch holds no rests is read as it is stated, the output at rest told by the other sections.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,13 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.findings import Finding
 from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import coarse_steps
@@ -65,10 +70,18 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Cut:
-    """The sections of stretches; and those of no use, by name, with the reason."""
+    """The sections of stretches; those of no use, by name, with the reason; and what is to be said of either."""
 
     sections: tuple[Section, ...]
     unused: dict[str, str]
+    notes: tuple[Finding, ...] = ()
+
+
+class Flaw(NamedTuple):
+    """The reason why a stretch is of no use: the code of its finding, empty where another one asks, and words."""
+
+    code: str
+    why: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +92,11 @@ class _Read:
     acc: tuple[Array, ...] = ()
     gyro: tuple[Array, ...] = ()
     gyro_samples: int = 0
+    notes: tuple[Finding, ...] = ()
+
+
+_EDGE: Final = 5
+"""Samples at an end of a turn whose mean says whether it is under way there."""
 
 
 def cut(stretches: Sequence[Stretch]) -> Cut:
@@ -89,29 +107,41 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
     The noise of means is told by all stretches of a kind together (that of one is hardly known) by their Allan
     variances, so that what does not average out counts. Coarse outputs add the square of a step over 12.
     """
+    done: dict[int, _Read | Flaw] = {
+        k: _steady(stretch) for k, stretch in enumerate(stretches) if stretch.row.kind in ("rest", "rate")
+    }
+    rests = [
+        one.section.gyro
+        for one in done.values()
+        if isinstance(one, _Read) and one.section.kind == "rest" and one.section.gyro is not None
+    ]
+    bias = np.median(rests, axis=0) if rests else None
+    done |= {k: _turn(stretch, bias) for k, stretch in enumerate(stretches) if stretch.row.kind == "turn"}
     read: list[_Read] = []
     unused: dict[str, str] = {}
-    for stretch in stretches:
-        if stretch.row.kind in ("rest", "rate", "turn"):
-            one = _turn(stretch) if stretch.row.kind == "turn" else _steady(stretch)
-            if isinstance(one, str):
-                unused[stretch.row.section] = one
-            else:
-                read.append(one)
-                if (
-                    stretch.row.kind == "turn"
-                    and stretch.acc is None
-                    and not _rests_in(stretch.row, stretches)
-                ):
-                    read += _ends_of(one)
+    notes: list[Finding] = []
+    for k in sorted(done):
+        one, row = done[k], stretches[k].row
+        if isinstance(one, _Read):
+            read.append(one)
+            notes += one.notes
+            if row.kind == "turn" and one.gyro and stretches[k].acc is None and not _rests_in(row, stretches):
+                read += _ends_of(one)
+            continue
+        unused[row.section] = one.why
+        if one.code:
+            act = "Record it again, or move its ends."
+            notes.append(
+                Finding(one.code, f"{row.section} is not used: {one.why}.", _where(row), (), action=act)
+            )
     sections = [one.section for one in read]
     for kinds in (("rest", "turn"), ("rate",)):
         places = [k for k, one in enumerate(read) if one.section.kind in kinds]
         for sensor in ("acc", "gyro"):
-            told = [k for k in places if getattr(read[k], sensor)]
-            if not told:
-                continue
+            told = [k for k in places if (read[k].gyro_samples if sensor == "gyro" else read[k].acc)]
             parts = [getattr(read[k], sensor) for k in told]
+            if not any(parts):
+                continue
             counts = [read[k].gyro_samples if sensor == "gyro" else min(map(len, read[k].acc)) for k in told]
             variances = variances_of_means([x for part in parts for x in part], counts)
             for k, variance in zip(told, variances, strict=True):
@@ -120,7 +150,7 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
                     sections[k] = dataclasses.replace(sections[k], acc_var=known)
                 else:
                     sections[k] = dataclasses.replace(sections[k], gyro_var=known)
-    return Cut(tuple(sections), unused)
+    return Cut(tuple(sections), unused, tuple(notes))
 
 
 def variances_of_means(stretches: Sequence[Array], counts: Sequence[int]) -> list[Array]:
@@ -170,16 +200,20 @@ def _constant(densities: Array, weights: Array) -> bool:
     return bool(np.all(np.abs(logs[1:] - logs[0]) < FINDING.noise_change * chance))
 
 
-def section_of(row: SectionRow) -> Section:
-    """A section with what its row says, and nothing read yet; of a kind rest, rate or turn."""
+def _where(row: SectionRow) -> str:
+    """The file and the times of a row, in words."""
     begin = "start" if row.begin is None else f"{row.begin:.2f} s"
     end = "end" if row.end is None else f"{row.end:.2f} s"
-    times = "" if row.begin is None and row.end is None else f", {begin} to {end}"
+    return row.file if row.begin is None and row.end is None else f"{row.file}, {begin} to {end}"
+
+
+def section_of(row: SectionRow) -> Section:
+    """A section with what its row says, and nothing read yet; of a kind rest, rate or turn."""
     assert row.kind in ("rest", "rate", "turn")
     return Section(
         kind=row.kind,
         name=row.section,
-        where=f"{row.file}{times}",
+        where=_where(row),
         why=row.why,
         up=row.up,
         up_u=row.placing,
@@ -199,11 +233,11 @@ def section_of(row: SectionRow) -> Section:
     )
 
 
-def _steady(stretch: Stretch) -> _Read | str:
-    """A rest or a steady rate; what is wrong with it, in words. Of a rate the accelerometers are left out."""
+def _steady(stretch: Stretch) -> _Read | Flaw:
+    """A rest or a steady rate; or what is wrong with it. Of a rate the accelerometers are left out."""
     row = stretch.row
     if row.kind == "rate" and row.rate is None:
-        return "its rate is not stated"
+        return Flaw("", "its rate is not stated")
     acc = stretch.acc if row.kind == "rest" else None
     triads = {
         sensor: one
@@ -213,7 +247,9 @@ def _steady(stretch: Stretch) -> _Read | str:
     clipped = [sensor for sensor, one in triads.items() if one.clipped.mean() > LIMITS.clipped_part]
     whole = {sensor: one for sensor, one in triads.items() if sensor not in clipped}
     if not whole:
-        return f"the {clipped[0]} is at the end of its range" if clipped else "no samples lie in it"
+        if clipped:
+            return Flaw("saturation", f"the {clipped[0]} is at the end of its range")
+        return Flaw("poor_section", "no samples lie in it")
     longest = max(whole.values(), key=lambda one: len(one.t))
     means = {sensor: one.values.mean(axis=0) for sensor, one in whole.items()}
     if stretch.force is not None and len(stretch.force.t):
@@ -229,37 +265,45 @@ def _steady(stretch: Stretch) -> _Read | str:
     )
 
 
-def _turn(stretch: Stretch) -> _Read | str:
-    """A turn from rest to rest; what is wrong with it, in words."""
+def _turn(stretch: Stretch, bias: Array | None) -> _Read | Flaw:
+    """A turn from rest to rest; or what is wrong with it. ``bias`` (3,) is the gyro's mean output in rests."""
     row, gyro = stretch.row, stretch.gyro
     if row.angle is None:
-        return "its angle is not stated"
+        return Flaw("", "its angle is not stated")
     if gyro is None:
-        return "a turn without a gyro says nothing"
+        return Flaw("poor_section", "a turn without a gyro says nothing")
     motion = motion_between_rests(gyro.t, gyro.values)
     if isinstance(motion, str):
-        return motion
-    first, last = motion
+        if bias is None or row.begin is None or row.end is None or len(gyro.t) < 4 * _EDGE:
+            return Flaw("poor_section", motion)
+        first, last = 0, len(gyro.t) - 1
+    else:
+        first, last = motion
     part = slice(first, last + 1)
     t, values = gyro.t[part], gyro.values[part]
     if (clipped := int(np.count_nonzero(gyro.clipped[part]))) > 0:
-        return f"{clipped} samples of the gyro in the turn are at the end of its range"
+        return Flaw("saturation", f"{clipped} samples of the gyro in the turn are at the end of its range")
     gaps = np.diff(t)
     if gaps.max() > LIMITS.motion_gap * gyro.step or gaps.min() < 0.0:
-        return "samples are missing within the turn"
-    duration = float(t[-1] - t[0])
+        return Flaw("poor_section", "samples are missing within the turn")
+    cells = lengths_of(t)
+    duration = float(cells.sum())
     before, after = gyro.values[:first], gyro.values[last + 1 :]
-    line = np.linspace(0.0, 1.0, len(t))[:, None] * (after.mean(axis=0) - before.mean(axis=0)) + before.mean(
-        axis=0
-    )
-    run = _integrals(t, values - line)
+    notes: tuple[Finding, ...] = ()
+    if len(before):
+        change = after.mean(axis=0) - before.mean(axis=0)
+        line = np.linspace(0.0, 1.0, len(t))[:, None] * change + before.mean(axis=0)
+    else:
+        line = np.broadcast_to(np.asarray(bias), values.shape)
+        cut_off = _cut_off(row, values - line)
+        if isinstance(cut_off, Flaw):
+            return cut_off
+        notes = cut_off
+    run = np.cumsum(cells[:, None] * (values - line), axis=0)
     angle = row.angle.value * (run @ run[-1]) / (run[-1] @ run[-1])
-    cosine_sine = tuple(float(np.trapezoid(f(angle), t)) / duration for f in (np.cos, np.sin))
+    cosine_sine = float(cells @ np.cos(angle)) / duration, float(cells @ np.sin(angle)) / duration
     section = dataclasses.replace(
-        section_of(row),
-        gyro=np.asarray(np.trapezoid(values, t, axis=0) / duration),
-        duration=duration,
-        cosine_sine=(cosine_sine[0], cosine_sine[1]),
+        section_of(row), gyro=cells @ values / duration, duration=duration, cosine_sine=cosine_sine
     )
     rests: tuple[Array, ...] = ()
     if stretch.acc is not None:
@@ -269,7 +313,7 @@ def _turn(stretch: Stretch) -> _Read | str:
             section = dataclasses.replace(section, acc=rests[0].mean(axis=0), acc_after=rests[1].mean(axis=0))
         else:
             rests = ()
-    return _Read(section, rests, (before, after), len(t))
+    return _Read(section, rests, (before, after) if len(before) else (), len(t), notes)
 
 
 def _rests_in(row: SectionRow, stretches: Sequence[Stretch]) -> bool:
@@ -296,10 +340,38 @@ def _ends_of(turn: _Read) -> list[_Read]:
     return ends
 
 
-def _integrals(t: Array, values: Array) -> Array:
-    """Running integrals (n, 3) of values (n, 3)."""
-    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None]
-    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+def _cut_off(row: SectionRow, rate: Array) -> Flaw | tuple[Finding, ...]:
+    """A finding about a turn that is under way at an end of its stretch, with the harm that this may do, or a flaw.
+
+    ``rate`` (n, 3) is the output less that at rest. At a steady deceleration the square of the share of the rate at the
+    end is that of the angle that is missing.
+    """
+    assert row.angle is not None
+    largest = float(np.max(np.abs(rate)))
+    if np.max(np.abs(rate.mean(axis=0))) < FINDING.faint_turn * largest or largest == 0.0:
+        return Flaw("poor_section", "nothing turns in it")
+    edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
+    share = max(edges) / largest
+    if share <= LIMITS.cut_rate:
+        return ()
+    end = "begin" if edges[0] == max(edges) else "end"
+    way = f"under way at its {end}, at {100.0 * share:.0f} % of its largest rate"
+    if share > LIMITS.lost_rate:
+        return Flaw("poor_section", f"it is {way}, so that its angle is not known")
+    axis = "xyz"[int(np.argmax(np.abs(rate.mean(axis=0) if row.axis is None else row.axis)))]
+    gains = (f"S_{axis}", *(f"T_{i}{axis}" for i in "xyz" if i != axis))
+    small = share**2 * abs(row.angle.value) < row.angle.u
+    text = f"{row.section} is {way}: some of its angle is cut off."
+    act = f"Move its {end} to where it rests, or state the u of its angle."
+    return (Finding("turn_cut", text, _where(row), () if small else gains, action=act),)
+
+
+def lengths_of(t: Array) -> Array:
+    """Length of time (n,) that each sample stands for [s]: half the way to its neighbours, at the ends a whole interval
+    as inside, so that with even stamps an integral is the sum over the rate."""
+    steps = np.diff(t)
+    padded = np.concatenate([steps[:1], steps, steps[-1:]])
+    return np.asarray(0.5 * (padded[:-1] + padded[1:]))
 
 
 def motion_between_rests(t: Array, gyro: Array) -> tuple[int, int] | str:

@@ -92,6 +92,9 @@ class Limits:
     least_turn: float = 0.2
     """Rotation, as a part of the largest between two holds, from which it may be a turn."""
 
+    faint_turn: float = 0.05
+    """Mean rate in the stretch of a turn, as a part of the largest, below which nothing turns in it."""
+
     whole_turn: float = 0.1
     """Part by which the gyro's reading may miss whole turns that are taken for granted."""
 

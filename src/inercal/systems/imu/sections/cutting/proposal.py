@@ -44,7 +44,7 @@ class Proposal:
     unused: dict[str, str]
     questions: tuple[Finding, ...]
     notes: tuple[Finding, ...] = ()
-    """Findings that ask nothing and do no harm, such as holds of no use."""
+    """Findings that ask nothing, such as holds of no use."""
     moves: tuple[NamedMove, ...] = ()
     swings: tuple[SwingStretch, ...] = ()
 
@@ -88,11 +88,12 @@ class Proposal:
         asked = [*questions, *contradictions(sections, scale)]
         notes = tuple(one for one in asked if not one.harm)
         asked = [one for one in asked if one not in notes]
-        return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), notes)
+        return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), (*notes, *done.notes))
 
     @staticmethod
-    def by(rows: Sequence[SectionRow], records: Mapping[str, Record]) -> Proposal:
-        """The sections that rows state of recordings, given by the names of their files.
+    def by(rows: Sequence[SectionRow], records: Mapping[str, Record], *, backward: bool = False) -> Proposal:
+        """The sections that rows state of recordings, given by the names of their files; ``backward`` is a gyro that
+        counts against the right-hand rule.
 
         Raises
         ------
@@ -127,7 +128,8 @@ class Proposal:
         sections += done.sections
         scales = {_scale(file.record) for file in files.values() if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
-        return Proposal._whole(rows, sections, recorded, done.unused, contradictions(sections, scale), ())
+        asked = contradictions(sections, scale, backward=backward)
+        return Proposal._whole(rows, sections, recorded, done.unused, asked, done.notes)
 
     @staticmethod
     def _whole(

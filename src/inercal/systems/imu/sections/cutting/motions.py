@@ -6,7 +6,7 @@ start from. So motions are taken apart at every pause, and all runs of them are 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +71,7 @@ class AccelerometerLevel:
     size: float
 
     @staticmethod
-    def of(acc: Triad, holds: tuple[Dwell, ...]) -> AccelerometerLevel:
+    def of(acc: Triad, holds: Sequence[Dwell]) -> AccelerometerLevel:
         """By the holds: each axis lies level in most of them."""
         means = np.array([hold.of(acc.values).mean(axis=0) for hold in holds])
         middle = np.median(means, axis=0)
@@ -95,7 +95,7 @@ def part(gyro: Triad, acc: Triad, start: int, stop: int) -> tuple[Array, Array]:
 def motions(
     acc: Triad,
     gyro: Triad,
-    holds: tuple[Dwell, ...],
+    holds: Sequence[Dwell],
     level: AccelerometerLevel,
     bias: Array,
     cuts: NDArray[np.int64],

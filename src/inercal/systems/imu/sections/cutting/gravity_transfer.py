@@ -8,6 +8,7 @@ with a prior.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +19,10 @@ from inercal.foundation.geometry.rotations import angle_between
 from inercal.foundation.inference.least_squares import NonlinearFit, solve
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.column import Triad
-from inercal.systems.imu.ferraris.detection import Detected
-from inercal.systems.imu.ferraris.method import Inputs, Matrices, matrices
-from inercal.systems.imu.ferraris.motions import part
-from inercal.systems.imu.ferraris.names import POSITIONS
+from inercal.foundation.records.dwells import Dwell
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.recording import clipped_rows
+from inercal.systems.imu.sections.cutting.motions import SectionMotion, part
 from inercal.systems.imu.turns import Turns, carried_with_derivatives, cut_turns, first_guess
 
 MISALIGNMENT = 0.03
@@ -37,31 +36,52 @@ _NAMES = (*(f"S_{i}" for i in "xyz"), *(f"{s}_{i}{j}" for s in "TM" for i in "xy
 
 
 @dataclass(frozen=True, eq=False)
+class AtRest:
+    """Level of the accelerometers, bias (3,) of the gyro [output], and its g-sensitivity (3, 3) [output per g]."""
+
+    accelerometer: TriadModel
+    rate_bias: Array
+    by_g: Array
+
+    @staticmethod
+    def of(acc: Triad, gyro: Triad, sides: Mapping[str, Dwell]) -> AtRest | None:
+        """By the six sides, by name as ``+x``; None without all of them."""
+        names = [f"{sign}{letter}" for letter in "xyz" for sign in "+-"]
+        if not all(name in sides for name in names):
+            return None
+        spans = [sides[name] for name in names]
+        force = np.array([np.nanmean(span.of(acc.values), axis=0) for span in spans])
+        rate = np.array([np.nanmean(part(gyro, acc, span.start, span.stop)[1], axis=0) for span in spans])
+        gain = 0.5 * (force[0::2] - force[1::2]).T
+        scale, bias = np.diag(gain), np.diagonal(0.5 * (force[0::2] + force[1::2]))
+        model = TriadModel(scale, gain / scale[:, None], bias)
+        return AtRest(model, rate.mean(axis=0), 0.5 * (rate[0::2] - rate[1::2]).T)
+
+
+@dataclass(frozen=True, eq=False)
 class Carried:
     """``scale`` (3,) [output per rad/s] and ``u`` (3,), its standard uncertainty as a part of it, inf where nothing is
-    known; ``at_rest`` holds the biases and the g-sensitivity (per g) by the positions."""
+    known."""
 
     scale: Array
     u: Array
-    at_rest: Matrices
 
 
-def carry(acc: Triad, gyro: Triad, detected: Detected) -> Carried:
-    """Fit scale factors and misalignments to the verticals in all holds; the six positions must be among them."""
-    at_rest = _at_rest(acc, gyro, detected)
-    nothing = Carried(np.ones(3), np.full(3, np.inf), at_rest)
+def carry(
+    acc: Triad, gyro: Triad, holds: Sequence[Dwell], at_rest: AtRest, motions: Sequence[SectionMotion]
+) -> Carried:
+    """Fit scale factors and misalignments to the verticals in all holds; ``motions`` may be turns about an axis."""
+    nothing = Carried(np.ones(3), np.full(3, np.inf))
     model = at_rest.accelerometer
-    f = np.array([model.correct(hold.of(acc.values).mean(axis=0)) for hold in detected.holds])
+    f = np.array([model.correct(hold.of(acc.values).mean(axis=0)) for hold in holds])
     f /= np.linalg.norm(f, axis=1, keepdims=True)
     spans, clipped = [], clipped_rows(gyro)
-    for k, (here, there) in enumerate(itertools.pairwise(detected.holds)):
+    for k, (here, there) in enumerate(itertools.pairwise(holds)):
         start, stop = (int(np.searchsorted(gyro.t, acc.t[row])) for row in (here.stop - 1, there.start))
-        if is_recorded(gyro, clipped, start, stop):
+        if _is_recorded(gyro, clipped, start, stop):
             spans.append((k, start, stop))
-    if (
-        sum(float(angle_between(f[k], f[k + 1])) > LIMITS.transfer_tilt for k, _, _ in spans)
-        < LIMITS.fewest_transfers
-    ):
+    tilted = [k for k, _, _ in spans if float(angle_between(f[k], f[k + 1])) > LIMITS.transfer_tilt]
+    if len(tilted) < LIMITS.fewest_transfers:
         return nothing
     force = model.correct(acc.values)
     if gyro.t is not acc.t:
@@ -71,31 +91,21 @@ def carry(acc: Triad, gyro: Triad, detected: Detected) -> Carried:
     ways = cut_turns(gyro.t, gyro.values, force, spans)
     guesses = [(*first_guess(ways, f, at_rest.rate_bias, sign * np.eye(3)), sign) for sign in (1.0, -1.0)]
     scale, _, sign = min(guesses, key=lambda guess: guess[1])
-    problem = _Transfer(ways, f, at_rest, _directions(detected), sign)
+    problem = _Transfer(ways, f, at_rest, _directions(motions), sign)
     x, miss = np.concatenate([np.full(3, scale), np.zeros(12)]), 0.05
     for _ in range(4):
         fit = problem.solved(x, miss)
         x, miss = fit.x, problem.miss(fit, miss)
     if not fit.converged or np.any(x[:3] <= 0.0):
         return nothing
-    return Carried(x[:3], np.sqrt(np.diag(fit.unit_covariance)[:3]) / x[:3], at_rest)
+    return Carried(x[:3], np.sqrt(np.diag(fit.unit_covariance)[:3]) / x[:3])
 
 
-def _at_rest(acc: Triad, gyro: Triad, detected: Detected) -> Matrices:
-    """Biases and g-sensitivity by the positions, in units of g."""
-    spans = [detected.positions[name] for name in POSITIONS]
-    force = np.array([np.nanmean(acc.values[start:stop], axis=0) for start, stop in spans])
-    rate = np.array([np.nanmean(part(gyro, acc, *span)[1], axis=0) for span in spans])
-    one = np.ones(3)
-    x = Inputs(force, rate, force[::2], rate[::2], one, one, np.array(1.0), np.array(0.0))
-    return matrices(x, np.full(6, 1.0 / 6.0))
-
-
-def _directions(detected: Detected) -> Array:
+def _directions(motions: Sequence[SectionMotion]) -> Array:
     """(3, 3): responses of the outputs to a turn about each axis (column), over that of its own, by the motions."""
     T = np.eye(3)
     for axis in range(3):
-        own = [motion for motion in detected.motions if motion.axis == axis]
+        own = [motion for motion in motions if motion.axis == axis]
         if own:
             largest = max(own, key=lambda motion: abs(motion.rotation[axis])).rotation
             T[:, axis] = largest / largest[axis]
@@ -108,7 +118,7 @@ class _Transfer:
 
     ways: Turns
     f: Array
-    at_rest: Matrices
+    at_rest: AtRest
     T: Array
     sign: float
 
@@ -143,7 +153,7 @@ class _Transfer:
         tilted = self.f @ M.T
         size = np.linalg.norm(tilted, axis=1)
         up = tilted / size[:, None]
-        end, by, through = carried_with_derivatives(self.ways, up, model, self.at_rest.apparent_g)
+        end, by, through = carried_with_derivatives(self.ways, up, model, self.at_rest.by_g)
         by_up = np.zeros((len(up), 3, 6))
         for k, (i, j) in enumerate(_ACROSS):
             moved = self.f[:, j, None] * np.eye(3)[i]
@@ -153,7 +163,7 @@ class _Transfer:
         return end - up[last], np.concatenate([of_gyro, through @ by_up[first] - by_up[last]], axis=2)
 
 
-def is_recorded(gyro: Triad, clipped: NDArray[np.bool_], start: int, stop: int) -> bool:
+def _is_recorded(gyro: Triad, clipped: NDArray[np.bool_], start: int, stop: int) -> bool:
     """True if the gyro recorded a whole transfer, from sample ``start`` to ``stop``.
 
     ``clipped`` (n,) are the rows in which the gyro saturates.
