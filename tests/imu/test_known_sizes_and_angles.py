@@ -1,5 +1,7 @@
 """Pose means, known rates and known turns: against truth by simulators of plain NumPy, and against real recordings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from campaigns.rows import (
@@ -25,7 +27,7 @@ from recordings import shipped
 from scipy.stats import binom
 
 import inercal as ic
-from inercal.foundation.errors import StudyError
+from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.instruments.terms import GYRO_TRIAD
 from inercal.systems.imu.figures import page, pictures
@@ -36,6 +38,7 @@ from inercal.systems.imu.settings import (
     KnownRatesSettings,
     KnownTurnsSettings,
     MeansSettings,
+    SectionsSettings,
 )
 from inercal.systems.imu.task import calibrate, calibrate_files
 from rows import for_each
@@ -53,7 +56,9 @@ def covered(method, runs, seed):
     return float(np.mean(inside)), float(np.mean(ok))
 
 
-@pytest.mark.parametrize("method", ["means", "known_rates", "known_turns"])
+@pytest.mark.parametrize(
+    "method", ["means", pytest.param("known_rates", marks=pytest.mark.slow), "known_turns"]
+)
 def test_intervals_cover_the_truth(method):
     """Coefficients of a run are correlated: some three independent ones a run at worst, 60 of 95 %; 3.3 sigma low."""
     share, ok = covered(method, 20, 11)
@@ -153,13 +158,12 @@ def test_the_mean_of_a_moving_pose_is_named_and_can_be_left_out():
 
 
 def test_samples_of_a_recording_are_no_pose_means():
-    from inercal.foundation.errors import RecordError
-
     record, _ = shipped("xsens")
     with pytest.raises(RecordError, match="most of them like the one before, expected one row for each pose"):
         calibrate(record, ImuSettings(SITE, method=MeansSettings()))
 
 
+@pytest.mark.slow
 def test_rates_that_contradict_each_other_are_found():
     """45 rpm that is 0.4 % less, nine times the u of the two; files in another order."""
     _, rows = platter(np.random.default_rng(5), off=(0.0, 0.0, -0.004))
@@ -226,6 +230,7 @@ def test_what_changes_over_the_orientations_is_named(drift, words):
     assert finding.harm
 
 
+@pytest.mark.slow
 def test_trends_are_named_falsely_as_rarely_as_stated():
     """30 sound tests: two tests of 1e-3 each, at 99.99 %."""
     rng = np.random.default_rng(15)
@@ -253,6 +258,82 @@ def test_steady_stretches_of_a_recording_are_the_orientations():
     assert kinds.count("rate") == 28
     assert kinds.count("rest") == 6  # the stops of the file at rest are rests as well
     assert np.all(np.abs(estimate.values - truth) < 4.0 * estimate.u)
+
+
+@pytest.mark.slow
+def test_a_bias_that_drifts_in_each_file_is_in_u():
+    """A straight drift of 3 deg/h per s: S and T of 20 units are off by less than stated, and it is named."""
+    rng = np.random.default_rng(17)
+    off = []
+    for _ in range(20):
+        truth, records = turns(rng, drift=0.015)
+        estimate = by_turns(records)
+        assert estimate.status is Status.OK
+        off.append((estimate.values - truth) / estimate.u)
+    assert np.sqrt(np.mean(np.square(off)[:, 3:])) < 1.15
+    drifting = by_turns(turns(rng, drift=0.5)[1])
+    assert "excess_scatter" in {finding.code for finding in drifting.findings}
+
+
+def test_the_alignment_that_nobody_states_is_in_u():
+    """Absent it is not exact: T of axes off by 0.1 deg is within what is usual."""
+    truth, records = turns(np.random.default_rng(18))
+    estimate = by_turns(records, alignment=None)
+    assert "placing_by_prior" in {finding.code for finding in estimate.findings}
+    assert np.all(estimate.u[6:] > TILT)
+    assert np.all(np.abs(estimate.values - truth)[6:] < 3.0 * estimate.u[6:])
+
+
+@for_each(
+    ("options", "code"),
+    [
+        (KnownRatesSettings(tuple(RATES), (0.0, RATES_U[1], 0.0)), "stated_exact"),
+        (KnownRatesSettings(tuple(RATES), tuple(RATES_U)), "g_sensitivity"),
+    ],
+)
+def test_what_was_not_stated_of_rates_is_said(options, code):
+    records = [record_of("gyro", each) for each in platter(np.random.default_rng(19))[1]]
+    findings = calibrate_files(records, ImuSettings(SITE, method=options)).estimate.findings
+    assert code in {finding.code for finding in findings}
+    assert not any(finding.harm for finding in findings if finding.code == code)
+
+
+def test_orientations_in_a_plane_leave_a_scale_factor_open_and_say_so():
+    rng = np.random.default_rng(20)
+    _, outputs = triad(rng, 4000.0)
+    flat = directions(rng, 14) * [1.0, 1.0, 0.0]
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    estimate = by_rates([outputs(rate * flat) + 0.5 * rng.normal(size=flat.shape) for rate in RATES])
+    assert estimate.status is Status.UNOBSERVABLE
+    assert estimate.message == "the sections leave S_z open: add a rate or turn about z"
+
+
+def test_labels_of_one_file_are_the_turns():
+    """The same samples as in three files, whose biases may differ: values within half a u."""
+    _, records = turns(np.random.default_rng(21))
+    values = np.concatenate([record.triad("gyro").values for record in records])
+    t = 0.01 * np.arange(len(values))
+    labels = tuple(np.repeat(["x_rot", "y_rot", "z_rot"], len(values) // 3).tolist())
+    whole = by_turns([replace(record_of("gyro", values, t), labels=labels)])
+    three = by_turns(records)
+    assert whole.status is three.status is Status.OK
+    assert np.all(np.abs(whole.values - three.values) < 0.5 * three.u)
+    with pytest.raises(RecordError, match="found no rows of the label 'z' in one file"):
+        by_turns([replace(record_of("gyro", values, t), labels=tuple("xy" * (len(t) // 2)))])
+
+
+def test_a_gyro_beside_means_is_said_not_to_be_calibrated():
+    values = pose_means(np.random.default_rng(22))[1]
+    both = ic.record(acc=values, gyro=values, rate=1.0, units={"acc": "count", "gyro": "count"})
+    estimate = calibrate(both, ImuSettings(SITE, method=MeansSettings())).estimate
+    assert "gyro_missing" in {finding.code for finding in estimate.findings}
+    np.testing.assert_array_equal(estimate.values, by_means(values).values)
+
+
+def test_the_mean_of_a_turn_is_refused():
+    rows = ({"section": "a", "kind": "turn", "axis": "+x", "angle": "360 deg"},)
+    with pytest.raises(StudyError, match="found turn of a row of means, expected rest or rate"):
+        calibrate(record_of("gyro", np.ones((1, 3))), ImuSettings(SITE, method=SectionsSettings(rows=rows)))
 
 
 def test_turns_against_their_sense_or_about_another_axis_are_found():
@@ -298,6 +379,7 @@ def test_turns_of_a_real_unit_give_what_ferraris_gives():
         assert abs(here.value - there.value) < 3.0 * np.hypot(here.u, there.u)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["known_rates", "known_turns"])
 @for_each("row, t", [(0, 90.0), (700, 907.0), (700, 0.7), (-1, 9999.0)])
 def test_one_wrong_stamp_changes_next_to_nothing(method, row, t):

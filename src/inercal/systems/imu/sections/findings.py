@@ -128,8 +128,7 @@ def _rates(found: SectionCalibration) -> Iterator[Finding]:
             f"Rates contradict each other: that of {group} differs by {size:.1f} times what was stated.",
             group,
             EVERYTHING,
-            action="Check order, values and u of the rates, whether the gyro is linear, and its g-sensitivity, "
-            "which on a level table adds the same to every rate.",
+            action="Check order, values and u of the rates, and linearity and g-sensitivity of the gyro.",
             items=tuple(
                 {"rate": name, "off [of its u]": round(float(pull), 1)}
                 for name, pull in found.pulled_rates.items()
