@@ -52,7 +52,7 @@ def changed(sections, name, **fields):
 def test_sound_sections_are_ok(sound, unit):
     status, _, findings = judged(sound, unit)
     assert status is Status.OK
-    assert set(findings) <= {"by_prior", "scatter_by_prior", "stated_exact"}
+    assert set(findings) <= {"by_prior", "scatter_by_prior", "stated_exact", "blind"}
     assert {item["term"] for item in findings["by_prior"].items} >= {"K2_x", "K2_y", "K2_z"}
 
 

@@ -37,6 +37,10 @@ def spoken(found):
     return next((one for one in judged_sections(found) if one.code in CELLS), None)
 
 
+def harmful(found):
+    return [one for one in judged_sections(found) if one.code != "blind"]
+
+
 def test_the_gain_is_that_of_the_fit():
     """Readings moved by a little move the values by the gain times that."""
     sections, priors = of_bench(lambda b: [*sides(b), *turns(b)])
@@ -85,10 +89,13 @@ def test_an_output_that_saturates_softly_is_named():
     assert finding.harm
 
 
+@pytest.mark.slow
 def test_a_gain_that_steps_late_in_a_list_is_named():
+    """A scatter that nobody states takes up most of it: four rounds of six sides would not show it."""
+
     def stepped(b):
-        made = sides(b, 4, up_u=0.3 * DEG)
-        return [replace(s, acc=s.acc * (1.0 + 2e-3 * (k > 14))) for k, s in enumerate(made)]
+        made = sides(b, 8, up_u=0.3 * DEG)
+        return [replace(s, acc=s.acc * (1.0 + 2e-3 * (k > 28))) for k, s in enumerate(made)]
 
     sections, priors = of_bench(stepped)
     finding = spoken(calibrate_sections(sections, priors))
@@ -123,7 +130,7 @@ def test_sound_sections_are_not_named(name, runs):
     named = 0
     for seed in range(runs):
         sections, priors = of_bench(SOUND[name], 500 + seed, stated=bool(seed % 2))
-        named += bool(judged_sections(calibrate_sections(sections, priors)))
+        named += bool(harmful(calibrate_sections(sections, priors)))
     assert named <= max(runs // 20 - 1, 0)
 
 
@@ -132,7 +139,7 @@ def test_a_sound_record_by_hand_is_not_named_and_its_residuals_are_white():
     squares = dof = 0.0
     for seed in range(4):
         found = by_hand(turned_by_hand(np.random.default_rng(700 + seed), rests=20))
-        assert judged_sections(found) == ()
+        assert harmful(found) == []
         of_fit = evidence_of(fitted(found))
         squares, dof = squares + of_fit.squares, dof + of_fit.dof
     assert abs(squares / dof - 1.0) < 4.0 * np.sqrt(2.0 / dof)

@@ -18,6 +18,7 @@ from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.inference.evidence import AskedError, FitEvidence, evidence
 from inercal.foundation.inference.limits import LIMITS
 from inercal.foundation.inference.questions import JudgedFit, Question, questions
+from inercal.foundation.inference.signals import copies, ends, steps, uneven
 
 _CODES = {"order": "by_order", "place": "by_place", "reading": "by_reading", "history": "by_history"}
 
@@ -52,7 +53,7 @@ def judge(fit: JudgedFit, share: float = 1.0) -> tuple[Finding, ...]:
         return order
     pairs = asked_of(of_fit, questions(fit))
     spoken = answers(fit.names, fit.u, of_fit, pairs, share)
-    return (*_ends(fit), *_steps(fit), *spoken)
+    return (*ends(fit), *steps(fit), *copies(fit), *uneven(fit, of_fit, share), *spoken)
 
 
 Asked = Sequence[tuple[Question, AskedError]]
@@ -259,76 +260,6 @@ def _moved(
     for channel in taken:
         change[at[:, channel]] = fit.readings[at[moved, channel]] - fit.readings[at[:, channel]]
     return words, change, at[lost, taken]
-
-
-def _rms(fit: JudgedFit, own: NDArray[np.int64]) -> float:
-    """Rms residual of some readings."""
-    return float(np.sqrt(np.mean(np.square(fit.residuals[own]))))
-
-
-def _sigma(fit: JudgedFit, own: NDArray[np.int64]) -> float:
-    """Standard deviation of a reading of some, their median."""
-    return float(np.median(np.sqrt(np.diag(fit.covariance)[own])))
-
-
-def _grid(y: Array, rms: float) -> float:
-    """The step of which all differences of readings ``y`` (n,) are multiples; 0 where there is none.
-
-    A plan of regular inputs makes multiples too, but only as exact as its scatter ``rms``.
-    """
-    steps = np.diff(np.unique(y))
-    steps = steps[steps > 1e-9 * np.ptp(y)]
-    if len(steps) < 3:
-        return 0.0
-    step = float(steps.min())
-    left = float(np.abs(steps - step * np.round(steps / step)).max())
-    return step if left < 1e-3 * min(step, rms) else 0.0
-
-
-def _ends(fit: JudgedFit) -> Iterator[Finding]:
-    """Channels with equal readings at an end where the model differs."""
-    for channel, name in enumerate(fit.channels):
-        own = np.flatnonzero(fit.channel == channel)
-        if not len(own):
-            continue
-        y, model = fit.readings[own], fit.predicted[own]
-        if _grid(y, _rms(fit, own)) > 0.0 or not np.ptp(y):
-            continue
-        for word, end in (("upper", y.max()), ("lower", y.min())):
-            tied = np.abs(y - end) <= 1e-12 * np.ptp(y)
-            if tied.sum() > 1 and np.abs(model[tied] - model[tied].mean()).max() > LIMITS.tied * _sigma(
-                fit, own
-            ):
-                yield Finding(
-                    "saturation",
-                    f"{int(tied.sum())} readings of {name} are equal at its {word} end, where the model differs.",
-                    "",
-                    EVERYTHING,
-                    action="Take these readings out, or measure within the range of the sensor.",
-                )
-
-
-def _steps(fit: JudgedFit) -> Iterator[Finding]:
-    """Channels whose steps are larger than the scatter of their readings, and hence no noise."""
-    for channel, name in enumerate(fit.channels):
-        own = np.flatnonzero(fit.channel == channel)
-        if not len(own):
-            continue
-        rms = _rms(fit, own)
-        step = _grid(fit.readings[own], rms)
-        if step <= rms:
-            continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shift = np.nan_to_num(np.linalg.norm(fit.gain[:, own], axis=1) * step / math.sqrt(12.0) / fit.u)
-        harm = tuple(value for value, by in zip(fit.names, shift, strict=True) if by > LIMITS.harm)
-        if harm:
-            yield Finding(
-                "coarse_output",
-                f"The output {name} has steps of {step / rms:.2g} times its scatter, so that rounding is no noise.",
-                "",
-                harm,
-                action="Record more digits, or average over samples that noise spreads over several steps.",
-            )
 
 
 def gross(fit: JudgedFit) -> float:

@@ -43,6 +43,12 @@ class Limits:
     """Range of the predictions of a channel, over the standard deviation of a reading, from which it is asked by its
     readings."""
 
+    uneven: float = 3.0
+    """Scatter of one part of a test, over that of the others, from which it is named."""
+
+    part_risk: float = 1e-3
+    """Probability that any part of a sound test is."""
+
     tied: float = 2.8
     """Difference of predictions, in standard deviations of a reading, beyond which equal readings at an end are not one
     reading."""

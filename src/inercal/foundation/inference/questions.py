@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ class JudgedFit:
     channels : names of the channels
     inputs : inputs that the model takes as stated
     noise_dof : as in `inercal.foundation.inference.evidence.FitEvidence`
+    part : (n,) numbers from 0 of the ``parts`` of the test, such as files, by name; -1 for none
     """
 
     names: tuple[str, ...]
@@ -64,6 +65,8 @@ class JudgedFit:
     channels: tuple[str, ...]
     inputs: tuple[StatedInput, ...]
     noise_dof: float
+    part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    parts: tuple[str, ...] = ()
 
     @property
     def predicted(self) -> Array:

@@ -32,7 +32,11 @@ def erased(values: Array) -> NDArray[np.bool_]:
 
 def _noisy(values: Array) -> bool:
     """True where neighbours of values (n, c) in some column are no smooth motion."""
-    once, twice = (np.nanmedian(np.abs(np.diff(values, k, axis=0)), axis=0) for k in (1, 2))
+    told = values[:, np.isfinite(values).sum(axis=0) > LIMITS.erased_rows]
+    told = told[np.isfinite(told).all(axis=1)]
+    if len(told) < LIMITS.fewest_runs:
+        return False
+    once, twice = (np.median(np.abs(np.diff(told, k, axis=0)), axis=0) for k in (1, 2))
     return bool(np.any(twice > LIMITS.noisy_steps * once))
 
 

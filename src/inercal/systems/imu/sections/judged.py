@@ -88,7 +88,19 @@ def fitted(found: SectionCalibration) -> JudgedFit:
         tuple(_CHANNELS[k] for k in there),
         tuple(_inputs(found, dense)),
         0.0,
+        *_files(found, dense),
     )
+
+
+def _files(found: SectionCalibration, dense: _Dense) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """The file of each mean, -1 of a move, and the files by name where several hold some sections each."""
+    of_section = [section.where.partition(", ")[0] for section in found.problem.readings.sections]
+    files = tuple(sorted(set(of_section)))
+    if len(files) < 2 or len(of_section) < 3 * len(files):
+        return np.full(len(dense.cell), -1), ()
+    number = np.array([files.index(name) for name in of_section])
+    means = dense.block == 0
+    return np.where(means, number[np.where(means, dense.cell, 0)], -1), files
 
 
 def _dense(found: SectionCalibration, z: Array) -> _Dense:
