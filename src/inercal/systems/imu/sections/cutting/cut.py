@@ -164,7 +164,7 @@ def _constant(densities: Array, weights: Array) -> bool:
     return bool(np.all(np.abs(logs[1:] - logs[0]) < FINDING.noise_change * chance))
 
 
-def _known(row: SectionRow) -> Section:
+def stated_section(row: SectionRow) -> Section:
     """A section with what its row says."""
     begin = "start" if row.begin is None else f"{row.begin:.2f} s"
     end = "end" if row.end is None else f"{row.end:.2f} s"
@@ -213,7 +213,7 @@ def _steady(stretch: Stretch) -> _Read | str:
     if stretch.force is not None and len(stretch.force.t):
         means["force"] = stretch.force.values.mean(axis=0)
     known = dataclasses.replace(
-        _known(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
+        stated_section(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
     )
     return _Read(
         known,
@@ -250,7 +250,7 @@ def _turn(stretch: Stretch) -> _Read | str:
     angle = row.angle.value * (run @ run[-1]) / (run[-1] @ run[-1])
     cosine_sine = tuple(float(np.trapezoid(f(angle), t)) / duration for f in (np.cos, np.sin))
     section = dataclasses.replace(
-        _known(row),
+        stated_section(row),
         gyro=np.asarray(np.trapezoid(values, t, axis=0) / duration),
         duration=duration,
         cosine_sine=(cosine_sine[0], cosine_sine[1]),
