@@ -43,7 +43,7 @@ READ_A_STUDY = {
         "batch",
         "live",
     ),
-    *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
+    *("design tolerances", "design selfcal", "design strapdown", "design aoa", "design sections"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor", "live", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {

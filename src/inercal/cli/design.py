@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from inercal.systems.turntable.settings import TurntableSettings
 
 
+_ANYWHERE = "45 deg"
+"""Latitude of a table of sections without a study."""
+
+
 def design_positions(
     study: Study,
     /,
@@ -146,6 +150,25 @@ def design_aoa(
     with working(output) as progress:
         compared = system.design(the_study, progress)
     return give(compared, output, read_s, "layouts")
+
+
+def design_sections(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ResultOutput = ResultOutput(),
+) -> int:
+    """Say what sections of an IMU tell, and which one more would help most."""
+    from inercal.systems.imu import verbs as system
+
+    output.check(WHOLE, (study,))
+    if study.suffix.lower() == ".csv":  # what sections tell hardly depends on the place
+        overrides = [f"site.latitude={_ANYWHERE}", *(overrides or ())]
+    the_study, read_s = study_in("imu", study, overrides, output)
+    with working(output):
+        designed = system.design(the_study)
+    return give(designed, output, read_s, "sections")
 
 
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:

@@ -210,20 +210,22 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
     """Find the positions or tolerances of a turntable, the path of a platform, or the turns of a strapdown unit, that
-    tell most; of a model, say what its sensors can tell, beside the other layouts that the study states.
+    tell most; of a model, say what its sensors can tell, beside the other layouts that the study states; of an IMU,
+    what its sections tell, and which one more would help most.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
         ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"strapdown"`` of a strapdown
-        unit, ``"aoa"`` of a model, as the commands name it; if absent, by the kind, positions.
+        unit, ``"aoa"`` of a model, ``"sections"`` of an IMU, as the commands name it; if absent, by the kind,
+        positions.
 
     Returns
     -------
     Result
         Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is the best plan; of a
-        model ``evidence.bounds`` are those of the layouts.
+        model ``evidence.bounds`` are those of the layouts, of an IMU ``evidence.foretold`` is what the sections tell.
 
     Raises
     ------

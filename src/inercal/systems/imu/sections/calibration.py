@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -22,6 +22,7 @@ from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
+from inercal.systems.imu.sections.readings import Flags
 from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import FAR, NEAR, solved
@@ -247,7 +248,7 @@ def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
         )  # a scatter that may be small makes no fine instrument
         problem = with_classes(problem, _noise(problem, point, least_known))
         short = point.short
-        point = _shortened(problem, point, linear, linear.at(z), z, whole=whole)
+        point = shortened(problem, point, linear, linear.at(z), z, whole=whole)
         change = np.max(np.abs(point.short - short), initial=0.0)
         if converged and np.max(np.abs(z - before), initial=0.0) < _SETTLED and change < _SHORTENED:
             break
@@ -282,7 +283,7 @@ def _noise(problem: Problem, point: Iterate, z: Array) -> dict[str, float]:
     return out
 
 
-def _shortened(
+def shortened(
     problem: Problem, point: Iterate, linear: Linear, solution: ArrowSolution, z: Array, *, whole: bool
 ) -> Iterate:
     """The point with the mean and the variance of the part by which tilts that a section leaves open, within a known
@@ -324,12 +325,11 @@ def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
     u = U / stdtrit(dof, 0.975)
     scale = u / np.sqrt(np.diag(covariance))
 
-    budget = _budget(problem, linear, best, z, J)
+    budget = shares_of(problem, linear, best, z, J)
     left = linear.left(z, best)
     sd = linear.sd(z)[:count]
     size = np.sqrt(np.diag(covariance)) / np.abs(np.diag(J))
-    by = sum((share for source, share in budget.items() if source.startswith("prior")), np.zeros(count))
-    ruled = (size**2 > 0.5 * sd**2) | (by > 0.5)
+    ruled = ruled_by_prior(size, sd, budget)
     pulled = best.covariance[:count, :count] @ np.where(
         np.isfinite(sd), (problem.mean[at] - x[at] - mean) / sd**2, 0.0
     )
@@ -389,6 +389,13 @@ def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowS
     return out
 
 
+def ruled_by_prior(u: Array, sd: Array, shares: Mapping[str, Array]) -> Flags:
+    """Coefficients (p,) of whose ``u`` the sections say less than what was known before: their own ``sd``, or priors of
+    coefficients by their ``shares`` of u^2."""
+    by = sum((share for source, share in shares.items() if source.startswith("prior")), np.zeros(len(u)))
+    return np.asarray((u**2 > 0.5 * sd**2) | (by > 0.5))
+
+
 def in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:
     """Derivatives (p, p) of the coefficients by their ``values`` (p,) in the fit, and the coefficients: G is carried as
     a rate, of which outputs see S times as much. S that is not fitted is that of the unknowns ``x``."""
@@ -404,7 +411,7 @@ def in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, 
     return J, out
 
 
-def _budget(problem: Problem, linear: Linear, best: ArrowSolution, z: Array, J: Array) -> dict[str, Array]:
+def shares_of(problem: Problem, linear: Linear, best: ArrowSolution, z: Array, J: Array) -> dict[str, Array]:
     """Shares (p,) of the variances of the coefficients by source."""
     of_rows, of_priors = linear.shares(z, best, J)
     out: dict[str, Array] = {}

@@ -37,7 +37,7 @@ class Pace:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class CoursePiece:
     """A stretch of ``length`` [s] by a name, empty for the way between sections, from the attitude ``q`` (4,) on.
 
     It turns by the rotation vector ``step`` (3,) of the body, from rest to rest where ``smooth``, else at a steady
@@ -69,7 +69,7 @@ class Piece:
         return q, speed[:, None] * self.step / self.length, change[:, None] * self.step / self.length**2
 
 
-def course(rows: Sequence[SectionRow], pace: Pace, rng: np.random.Generator | None) -> list[Piece]:
+def course(rows: Sequence[SectionRow], pace: Pace, rng: np.random.Generator | None) -> list[CoursePiece]:
     """The pieces of sections one after the other, with the ways between them.
 
     A section lasts as long as its times say, else as the pace has it. Directions, rates and angles are off by what is
@@ -81,7 +81,7 @@ def course(rows: Sequence[SectionRow], pace: Pace, rng: np.random.Generator | No
     StudyError
         A turn without an angle, a rate without one, or a force of another recording.
     """
-    pieces: list[Piece] = []
+    pieces: list[CoursePiece] = []
     moves: list[SectionRow] = []
     placed = _Placed(pace, rng, sum(_lost(row) for row in rows))
     for row in rows:
@@ -101,11 +101,11 @@ def _lost(row: SectionRow) -> bool:
     return row.kind == "rest" and row.up is None and row.force is None
 
 
-def _way(before: Piece, after: Piece, moves: Sequence[SectionRow], pace: Pace) -> Piece:
+def _way(before: CoursePiece, after: CoursePiece, moves: Sequence[SectionRow], pace: Pace) -> CoursePiece:
     """The way from a section to the next, by the name of the move that stands between them."""
     step = log(multiply(conjugate(before.end), after.q))
     move = moves[0] if moves else SectionRow("", kind="move")
-    return Piece(move.section, _length(move, pace.turning), before.end, step, session=after.session)
+    return CoursePiece(move.section, _length(move, pace.turning), before.end, step, session=after.session)
 
 
 def _length(row: SectionRow, usual: float) -> float:
@@ -113,12 +113,14 @@ def _length(row: SectionRow, usual: float) -> float:
     return usual if row.begin is None or row.end is None else row.end - row.begin
 
 
-def _of(row: SectionRow, pace: Pace, placed: _Placed) -> Iterator[Piece]:
+def _of(row: SectionRow, pace: Pace, placed: _Placed) -> Iterator[CoursePiece]:
     """The pieces of a section."""
     where = f"section {row.section}"
     if isinstance(row.force, tuple):
         raise StudyError(where, "found channels as force, expected a direction to simulate, or three numbers")
-    piece = Piece(row.section, _length(row, pace.hold), np.zeros(4), force=row.force, session=row.session)
+    piece = CoursePiece(
+        row.section, _length(row, pace.hold), np.zeros(4), force=row.force, session=row.session
+    )
     if row.kind == "rest":
         yield replace(piece, q=placed.upright(placed.up(row)))
         return
@@ -224,7 +226,7 @@ def _off(direction: Array, error: Array) -> Array:
     return np.asarray(rotate(exp(error - direction * (direction @ error)), direction))
 
 
-def sampled(pieces: Sequence[Piece], rate: float) -> Iterator[tuple[Piece, Array, Array, Array]]:
+def sampled(pieces: Sequence[CoursePiece], rate: float) -> Iterator[tuple[CoursePiece, Array, Array, Array]]:
     """Each piece with attitudes (n, 4), rates and angular accelerations (n, 3) at its samples, ``rate`` [Hz]; samples
     of a sequence of pieces are evenly spaced."""
     ends = np.cumsum([0.0, *(piece.length for piece in pieces)])

@@ -7,10 +7,12 @@ from numpy.typing import NDArray
 
 from inercal.faces.report.coefficients import budget, correlation, values
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Dots, Level, Panel
+from inercal.faces.report.marks import Axis, Dots, Level, Mark, Panel
 from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres
+from inercal.faces.report.style import COLOURS
 from inercal.systems.imu.sections.calibration import SectionCalibration
+from inercal.systems.imu.sections.design import DesignedSections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
 
@@ -46,6 +48,36 @@ def _directions(found: SectionCalibration) -> list[Picture]:
             3.3,
         )
     ]
+
+
+def foretold(designed: DesignedSections) -> Picture:
+    """Sections more, by the factor to which u falls with each."""
+    shown = designed.shown
+    rows = np.arange(len(shown))
+    best = [min(one.factors.values()) for one in shown]
+    marks: list[Mark] = [
+        Dots([one.mean for one in shown], rows, "all terms, mean"),
+        Dots(best, rows, "the term it helps most", COLOURS[1], "s", filled=False),
+        Level(1.0, upright=True),
+    ]
+    return draw(
+        "One section more",
+        "Factor to which the standard uncertainty falls with each section more: of all terms in the geometric mean, "
+        "and of the term that it helps most.",
+        [
+            [
+                Panel(
+                    marks,
+                    Axis("u with it / u without", "log"),
+                    Axis(names=[one.section for one in shown]),
+                    grid="both",
+                )
+            ]
+        ],
+        0.9 + 0.22 * len(shown),
+        2,
+        "center",
+    )
 
 
 def _left(found: SectionCalibration) -> Picture:

@@ -60,6 +60,9 @@ class Limits:
     most_bends: int = 12
     """Combinations whose curvature counts at most."""
 
+    least_help: float = 0.95
+    """Factor on u by a planned section, from which on it helps a term."""
+
     # swings
 
     swing_window: float = 0.05
