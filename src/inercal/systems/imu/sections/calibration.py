@@ -22,7 +22,7 @@ from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
-from inercal.systems.imu.sections.readings import Flags
+from inercal.systems.imu.sections.readings import Flags, SectionArrays
 from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import FAR, NEAR, solved
@@ -206,8 +206,7 @@ def _calibrated(
     sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...], start: Iterate | None = None
 ) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    problem = problem_of(sections, priors, extras)
-    fit = _fit(softened(problem, _FINEST) or problem, start)
+    fit = _fit(_rounded(problem_of(sections, priors, extras)), start)
     rest, covariance = fit.linear.left(fit.z, fit.linear.at(fit.z))[0]
     agreement = of_sensors(fit.problem, rest, covariance)
     new = {sensor for sensor, p in agreement.items() if p < LIMITS.contradiction} - priors.excess
@@ -256,13 +255,25 @@ def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
     return _Fit(problem, point, linear, z, spread, converged)
 
 
+def _rounded(problem: Problem) -> Problem:
+    """The problem with the noise of rounding in all outputs, which those of an exact simulation have as well."""
+    r = problem.readings
+    return replace(
+        problem, readings=replace(r, variance=np.maximum(r.variance, (_FINEST * _largest(r)) ** 2))
+    )
+
+
+def _largest(readings: SectionArrays) -> Array:
+    """Largest outputs (3, 1) of the kinds of outputs."""
+    y, seen = np.abs(readings.y), readings.seen
+    sizes = [np.max(y[:, kinds][seen[:, kinds]], initial=0.0) for kinds in ([0, 1], [2])]
+    return np.array(sizes)[[0, 0, 1], None]
+
+
 def softened(problem: Problem, part: float) -> Problem | None:
     """The problem with a noise of means of at least this ``part`` of the largest outputs; None where it is no less."""
     r = problem.readings
-    largest = np.array(
-        [np.max(np.abs(r.y[:, kinds][r.seen[:, kinds]]), initial=0.0) for kinds in ([0, 1], [2])]
-    )
-    least = (part * largest[[0, 0, 1], None]) ** 2
+    least = (part * _largest(r)) ** 2
     softer = np.where(r.stated, np.maximum(r.variance, least), r.variance)
     if np.all(softer <= _SOFT * r.variance):
         return None

@@ -333,6 +333,7 @@ def _local(readings: SectionArrays, priors: Priors, scaled: bool, runs: Places) 
             )
     follows = readings.leader != np.arange(len(readings.sections))
     sd[follows, :RATE], placed[follows, :RATE] = 0.0, False
+    sd[readings.earth_leader != np.arange(len(readings.sections)), EARTH] = 0.0
     return sd, placed
 
 
