@@ -128,9 +128,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
         "turns by a known angle; aided: on a table whose angles are in the record; sections: rests, rates and turns, "
-        "each with what is known of it; shorthands of sections are means: accelerometers, a row of mean outputs for "
-        "each rest in an unknown direction; known_rates: a gyro on a platter or rate table, in unknown orientations; "
-        "known_turns: a gyro, a turn by a known angle about each axis",
+        "each with what is known of it; shorthands of sections are ferraris, means: accelerometers, a row of mean "
+        "outputs for each rest in an unknown direction; known_rates: a gyro on a platter or rate table, in unknown "
+        "orientations; known_turns: a gyro, a turn by a known angle about each axis",
     )
     sections: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,

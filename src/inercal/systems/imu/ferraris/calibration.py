@@ -243,7 +243,7 @@ def _backward(sense: Sense, options: FerrarisSettings) -> list[Finding]:
         return []
     told = sense.stated < LIMITS.vertical_miss
     act = "The gyro counts against the right-hand rule"
-    other = "or the sign of imu.ferraris.turn is wrong: the recording lacks the motion between the rests, which tells"
+    other = "or the sign of imu.ferraris.turn is wrong: the motion between the rests, which would tell, is not there"
     return [
         Finding(
             "sign_suspect",
