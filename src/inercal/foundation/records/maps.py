@@ -179,10 +179,12 @@ class RecordMap:
                     table = f"file.{part.name}.columns" if part.name else "columns"
                     asked = channel.question or f"Is the unit of {channel.name} {channel.unit.symbol}?"
                     answer = f"{channel.sensor}={channel.unit.symbol}"
+                    aside = f"{channel.sensor}={ASIDE}"
                     edit = ", or correct the unit there and take out grade" if self.written else ""
                     raise MapError(
                         f"{self.path}: {table}.{channel.name}" if self.written else self.path,
-                        f'{asked} Answer it with --answer "{answer}" or another unit{edit}',
+                        f'{asked} Answer it with --answer "{answer}" or another unit, or leave it aside with '
+                        f'"{aside}"{edit}',
                     )
 
 
