@@ -197,7 +197,7 @@ WITHIN = {
         "limits identified recording rows turns settings second_order simulate multiposition "
         "ferraris sections aided temperature task figures verbs system"
     ),
-    "strapdown": "limits model settings simulate reading fit before noise result task figures verbs system",
+    "strapdown": "limits model settings simulate reading fit before result task figures verbs system",
     "turntable": (
         "limits settings judged model weights second_order regression readings display sensitivity sensitivity_maps "
         "positions rate step_response step_test simulate task figures verbs system"
@@ -207,8 +207,8 @@ WITHIN = {
         "reference result simulate design foresight estimation task runs figures verbs system"
     ),
     "selfcal": (
-        "estimators limits platform disturbances settings stated still_joints filters before diagnosis find_base "
-        "monte_carlo reading result task several figures verbs system"
+        "estimators limits platform disturbances settings stated simulate still_joints filters before diagnosis "
+        "find_base monte_carlo reading result task several figures verbs system"
     ),
 }
 

@@ -13,7 +13,6 @@ from inercal.foundation.geometry.earth import GravityInput
 from inercal.foundation.results.budget import combine
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.observability import not_positive
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -24,6 +23,7 @@ from inercal.systems.selfcal.result.budget import stated_errors
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.result.outcome import assemble
 from inercal.systems.selfcal.settings import Filter, Noise
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 SHORT = study(

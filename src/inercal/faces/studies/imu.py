@@ -13,7 +13,6 @@ from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.rig import chain_of
 from inercal.faces.studies.tables import Stated, check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
@@ -23,6 +22,7 @@ from inercal.foundation.instruments.terms import (
     GYRO_G_SENSITIVITY,
     GYRO_TRIAD,
 )
+from inercal.foundation.rigs.stated_chain import chain_of
 from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.imu.settings import (
     TILT,

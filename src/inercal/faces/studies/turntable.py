@@ -11,8 +11,6 @@ from pydantic import Field
 
 from inercal.faces.studies.common import StudyFile, site_on_earth
 from inercal.faces.studies.instrument import instrument_of
-from inercal.faces.studies.positions import compared, grid_of, plan_of
-from inercal.faces.studies.rig import chain_of, limits_of
 from inercal.faces.studies.tables import Stated, settings_of, table_of
 from inercal.faces.studies.tolerances import CostsTable, tolerances_of
 from inercal.foundation._toml import check
@@ -21,6 +19,8 @@ from inercal.foundation.keys import OUTPUT, keys_of
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.rigs.plans import Grid, StatedPositions
 from inercal.foundation.rigs.stated import StatedRig
+from inercal.foundation.rigs.stated_chain import chain_of, limits_of
+from inercal.foundation.rigs.stated_plan import compared, grid_of, plan_of
 from inercal.foundation.units import Unit, parse_quantity
 from inercal.systems.turntable.settings import (
     Disturbances,

@@ -16,10 +16,10 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.strapdown.fit.batch import Fit, interval_covariance, variances_of
+from inercal.systems.strapdown.fit.restricted import opened
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import GRAVITY, LATITUDE
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.restricted import opened
 from inercal.systems.strapdown.settings import StrapdownSettings
 
 

@@ -30,7 +30,7 @@ from inercal.systems.strapdown.model.coefficients import (
     D,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.unmodelled import eliminated
+from inercal.systems.strapdown.fit.unmodelled import eliminated
 from inercal.systems.strapdown.settings import StrapdownSettings
 
 _FAMILIES = {

@@ -25,6 +25,8 @@ from inercal.foundation.results.remarks import at_prior_together, exact_gravity,
 from inercal.foundation.results.result import Estimate
 from inercal.systems.strapdown.fit.batch import Fit
 from inercal.systems.strapdown.fit.error_state import Filtered
+from inercal.systems.strapdown.fit.restricted import residuals
+from inercal.systems.strapdown.fit.unmodelled import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import (
     ALWAYS,
@@ -37,8 +39,6 @@ from inercal.systems.strapdown.model.coefficients import (
     stated,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.restricted import residuals
-from inercal.systems.strapdown.noise.unmodelled import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.result.budget import excess, sources
 from inercal.systems.strapdown.result.judged import judged_unit
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings

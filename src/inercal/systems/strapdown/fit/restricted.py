@@ -44,9 +44,9 @@ from inercal.systems.strapdown.fit.batch import (
     variances_of,
 )
 from inercal.systems.strapdown.fit.rests import Nodes
+from inercal.systems.strapdown.fit.unmodelled import DRIFT, TestedEffect, drifts, posed, tests
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.unmodelled import DRIFT, TestedEffect, drifts, posed, tests
 from inercal.systems.strapdown.settings import TURN_NOISE, WALKS, Noise, StrapdownSettings
 
 

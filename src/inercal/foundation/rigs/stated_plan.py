@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.faces.studies.rig import JOINTS, Limits
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.criteria import within
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.read import read
 from inercal.foundation.rigs.chain import Chain
-from inercal.foundation.rigs.plans import NAMED, Grid, Plan, StatedPositions, grid, listed, named
+from inercal.foundation.rigs.plans import NAMED, Grid, Plan, StatedPositions, grid, listed, named, within
+from inercal.foundation.rigs.stated_chain import JOINTS, Limits
 from inercal.foundation.units import shown
 
 MOST = 200_000

@@ -14,10 +14,10 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.rotations import exp, multiply
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.units import parse_unit
-from inercal.systems.selfcal.before.driven import Driven, drive
 from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_linear
+from inercal.systems.selfcal.platform.driven import Driven, drive
 from inercal.systems.selfcal.platform.joint_limits import beyond
 from inercal.systems.selfcal.platform.kinematics import all_angles, attitude
 from inercal.systems.selfcal.platform.layout import StateLayout
