@@ -29,7 +29,9 @@ from inercal.systems.selfcal.diagnosis.fit_quality import (
     white,
 )
 from inercal.systems.selfcal.diagnosis.gross import reordered_accelerometers
+from inercal.systems.selfcal.diagnosis.judged import answers, speaking
 from inercal.systems.selfcal.diagnosis.noise_check import misstated, unsteady
+from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of, periodic
 from inercal.systems.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.systems.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.systems.selfcal.diagnosis.small import Stated, likely, small_errors
@@ -44,19 +46,58 @@ _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
 
 
 def diagnose(
-    recording: Recording, problem: FilterProblem, result: FilterResult, systematic: Stated = None
+    recording: Recording,
+    problem: FilterProblem,
+    result: FilterResult,
+    systematic: Stated = None,
+    passed: PlatformPass | None = None,
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
-    ``result`` is that of the study's estimator; the error-state filter judges the recording itself. No error within the
-    uncertainties of ``systematic`` inputs is named.
+    ``result`` is that of the study's estimator, ``passed`` the pass at its values, made if absent; the error-state
+    filter judges the recording itself. No error within the uncertainties of ``systematic`` inputs is named.
     """
     if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []
+    if passed is None and result.kind == "error-state":
+        passed = pass_of(recording, problem, result)
     try:
+        if passed is not None and result.kind == "error-state" and sound(passed.final):
+            return _judged(passed, systematic)
         return _diagnosed(recording, problem, result, systematic)
     finally:
         forget()
+
+
+def _judged(passed: PlatformPass, systematic: Stated) -> list[Finding]:
+    """`diagnose` of a recording whose innovations are of the stated size at the final values: nothing more is filtered
+    unless a question, a prior, or the size and whiteness of the innovations says that something is wrong."""
+    case, final = (passed.recording, passed.problem), passed.final
+    moved = (
+        []
+        if systematic is None
+        else [
+            systematic.without(case, one)[1] for one in systematic.prior * np.eye(len(systematic.parameters))
+        ]
+    )
+    sums = passed.with_stated(moved)
+    hits, limit = answers(sums, passed.questions)
+    fair = _fair(passed.problem, passed.problem, passed.result)
+    noisy = bool(misstated(case, final))
+    if not hits and fair is passed.problem and not periodic(passed) and not noisy:
+        return []
+    meant = (
+        fair
+        if systematic is None
+        else _fair(
+            passed.problem, likely(*case, systematic), filtered((passed.recording, likely(*case, systematic)))
+        )
+    )
+    findings = _remaining(case, meant, systematic)
+    if noisy or any(finding.code != "contradiction" for finding in findings):
+        return findings
+    said = speaking(sums, hits, limit, passed.constants)
+    return findings if said is None else [said]
 
 
 def _diagnosed(
