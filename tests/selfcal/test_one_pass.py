@@ -229,3 +229,33 @@ def test_the_last_reading_of_sensors_that_are_early_is_of_a_platform_that_may_st
     assert np.abs((ends[1].coefficients - ends[0].coefficients) / u).max() < 0.2
     passed = pass_of(stopped, of, ends[1])
     assert np.nanmax(np.abs(passed.z[-1])) < 5.0
+
+
+def _pulled(made):
+    """A cable that pulls at the platform: an accelerometer's bias goes with the fourth harmonic of th_z."""
+    acc = made.acc.copy()
+    acc[:, 2] += 1e-4 * np.cos(4.0 * made.th[:, 2])
+    return replace(made, acc=acc)
+
+
+def _stepped(made):
+    """The scale of a gyro falls by 20 ppm at 60 % of the record."""
+    rate = made.rate.copy()
+    rate[:, 2] *= 1.0 - 2e-5 * (made.t[1:] > 0.6 * made.t[-1])
+    return replace(made, rate=rate)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "code", "among"),
+    [(_pulled, "by_place", "change with th_z 4 times a turn"), (_stepped, "by_reading", "above half")],
+)
+def test_what_no_hypothesis_says_is_asked_in_the_same_pass(rows, spoil, code, among):
+    """Named by what it shifts, without one more pass of the filter."""
+    settings = study()
+    made, _ = drawn(settings, 0)
+    found = calibrate(to_record(spoil(made)), settings).estimate
+    (said,) = (finding for finding in found.findings if finding.code in (code, "by_order"))
+    assert among in said.headline
+    assert said.harm
+    assert found.status is not Status.OK
+    assert rows["filter"] + rows["pass"] <= 5 * len(made.dt)

@@ -99,7 +99,8 @@ def contradicting_reference(recording: Recording, angles: Angles) -> list[Findin
         action = "check which sensor theta_ref is of, its unit, sign and clock"
         return [Finding("contradiction", text, harm=("theta",), action=action)]
     # those that are picked from a few come first where they leave about as little
-    enough = 2.0 * min(left for left, *_ in causes) + float(np.sum(np.square(of.u)))
+    agrees = LIMITS.reference_off**2 * float(np.sum(np.square(of.u)))
+    enough = 2.0 * min(left for left, *_ in causes) + agrees
     _, sentence, action = next(cause for cause in causes if cause[0] <= enough)
     return [Finding("contradiction", sentence, harm=("theta",), action=action)]
 
@@ -135,6 +136,7 @@ def _causes(of: _Compared) -> Iterator[tuple[float, str, str]]:
     for factor, how in _UNITS.items():
         for sign in (1.0, -1.0):
             left, _ = of.left(sign * factor)
+            left /= max(factor, 1.0) ** 2  # errors of the angle count as often
             yield left, f"theta_ref is {factor:.3g} times the angle, {how}", "correct the unit of theta_ref"
     left, (offset,) = of.left(1.0)
     text = f"theta_ref is {math.degrees(offset):.3g} deg off the angle all the time"

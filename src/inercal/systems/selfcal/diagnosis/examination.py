@@ -29,7 +29,7 @@ from inercal.systems.selfcal.diagnosis.fit_quality import (
     white,
 )
 from inercal.systems.selfcal.diagnosis.gross import reordered_accelerometers
-from inercal.systems.selfcal.diagnosis.judged import answers, speaking
+from inercal.systems.selfcal.diagnosis.judged import answers, explaining, speaking
 from inercal.systems.selfcal.diagnosis.noise_check import misstated, unsteady
 from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of, periodic
 from inercal.systems.selfcal.diagnosis.rig_errors import WANDERING
@@ -62,42 +62,44 @@ def diagnose(
     if passed is None and result.kind == "error-state":
         passed = pass_of(recording, problem, result)
     try:
-        if passed is not None and result.kind == "error-state" and sound(passed.final):
-            return _judged(passed, systematic)
-        return _diagnosed(recording, problem, result, systematic)
+        if passed is None or result.kind != "error-state":
+            return _diagnosed(recording, problem, result, systematic)
+        sums = passed.with_stated(_moved(passed, systematic))
+        hits, limit = answers(sums, passed.questions)
+        if (said := explaining(sums, hits, limit, passed.constants)) is not None:
+            return [said]
+        if not sound(passed.final):
+            return _diagnosed(recording, problem, result, systematic)
+        findings = _judged(passed, systematic, bool(hits))
+        if not hits or any(finding.code != "contradiction" for finding in findings):
+            return findings
+        said = speaking(sums, hits, limit, passed.constants)
+        return findings if said is None or misstated((recording, problem), passed.final) else [said]
     finally:
         forget()
 
 
-def _judged(passed: PlatformPass, systematic: Stated) -> list[Finding]:
-    """`diagnose` of a recording whose innovations are of the stated size at the final values: nothing more is filtered
-    unless a question, a prior, or the size and whiteness of the innovations says that something is wrong."""
-    case, final = (passed.recording, passed.problem), passed.final
-    moved = (
-        []
-        if systematic is None
-        else [
-            systematic.without(case, one)[1] for one in systematic.prior * np.eye(len(systematic.parameters))
-        ]
-    )
-    sums = passed.with_stated(moved)
-    hits, limit = answers(sums, passed.questions)
-    fair = _fair(passed.problem, passed.problem, passed.result)
-    noisy = bool(misstated(case, final))
-    if not hits and fair is passed.problem and not periodic(passed) and not noisy:
+def _moved(passed: PlatformPass, systematic: Stated) -> list[FilterProblem]:
+    """The problem with each of the systematic inputs moved by its uncertainty."""
+    if systematic is None:
         return []
-    meant = (
-        fair
-        if systematic is None
-        else _fair(
-            passed.problem, likely(*case, systematic), filtered((passed.recording, likely(*case, systematic)))
-        )
-    )
-    findings = _remaining(case, meant, systematic)
-    if noisy or any(finding.code != "contradiction" for finding in findings):
-        return findings
-    said = speaking(sums, hits, limit, passed.constants)
-    return findings if said is None else [said]
+    case = passed.recording, passed.problem
+    sizes = systematic.prior * np.eye(len(systematic.parameters))
+    return [systematic.without(case, size)[1] for size in sizes]
+
+
+def _judged(passed: PlatformPass, systematic: Stated, hit: bool) -> list[Finding]:
+    """`diagnose` of a recording whose innovations are of the stated size at the final values: nothing more is filtered
+    unless a question was ``hit``, or a prior, or the size and whiteness of the innovations says that something is
+    wrong."""
+    case, problem = (passed.recording, passed.problem), passed.problem
+    fair = _fair(problem, problem, passed.result)
+    if not (hit or fair is not problem or periodic(passed) or misstated(case, passed.final)):
+        return []
+    if systematic is not None:
+        of = likely(*case, systematic)
+        fair = _fair(problem, of, filtered((passed.recording, of)))
+    return _remaining(case, fair, systematic)
 
 
 def _diagnosed(

@@ -83,6 +83,22 @@ def speaking(sums: PassSums, hits: Sequence[Answer], limit: float, names: Sequen
     )
 
 
+def explaining(sums: PassSums, hits: Sequence[Answer], limit: float, names: Sequence[str]) -> Finding | None:
+    """The finding of a question that speaks and explains all: nothing else is still there beside it, innovations are of
+    the stated size without it, and no hypothesis says it with a value; None of any other."""
+    if not hits:
+        return None
+    excess = sums.chi2 - sums.dof
+    spread = LIMITS.nis_sigmas * math.sqrt(2.0 * sums.dof)
+    for hit in hits[: OF_JUDGE.compared]:
+        if excess - hit.score.explained > spread:
+            return None
+        rest = (sums.ask(other.question.columns, hit.question.columns) for other in hits if other is not hit)
+        if all(score is None or score.chance >= limit for score in rest):
+            return None if hit.question.named else speaking(sums, hits, limit, names)
+    return None
+
+
 def _item(kind: str, answer: Answer) -> dict[str, str | float]:
     """A row of the finding's table."""
     question, score = answer

@@ -34,6 +34,16 @@ _TURNS: Final = {
     8: "8 times a turn",
 }
 
+_NAMED: Final = (
+    "The reading of encoder x changes",
+    "The reading of encoder y changes",
+    "The reading of encoder z changes",
+    "The gyros differ in scale between",
+    "The accelerometers differ in scale between",
+    "The accelerometers curve",
+)
+"""Beginnings of the sentences of questions that a hypothesis says, too."""
+
 _LAGS: Final = (10.0, 60.0)
 """Times [s] by which a reading follows its load, and the square of it."""
 
@@ -64,11 +74,13 @@ class RowSignals(NamedTuple):
 
 class PlatformQuestion(NamedTuple):
     """A question: the ``cell`` order, place, reading or history, or ``rig``; its ``sentence`` without a full stop;
-    and the ``columns`` of the pass."""
+    and the ``columns`` of the pass. ``named``: a hypothesis (`inercal.systems.selfcal.diagnosis.rig_errors`,
+    `inercal.systems.selfcal.diagnosis.small`) says the same with its value and its remedy."""
 
     cell: str
     sentence: str
     columns: ErrorColumns
+    named: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +179,7 @@ def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
 
     errors = PassErrors(rig, True, tuple(counts.tolist()), courses)
     questions = [
-        PlatformQuestion(cell, sentence, ErrorColumns(np.array(at)))
+        PlatformQuestion(cell, sentence, ErrorColumns(np.array(at)), sentence.startswith(_NAMED))
         for (cell, sentence), at in places.items()
     ]
     kinds = np.array([KIND_OF[name] for name in rig])
@@ -177,7 +189,7 @@ def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
         sentence = f"The rig has {STATES[kind].words} that are no states".replace(
             ", in the extended model", ""
         )
-        questions.append(PlatformQuestion("rig", sentence, ErrorColumns(np.flatnonzero(kinds == kind))))
+        questions.append(PlatformQuestion("rig", sentence, ErrorColumns(np.flatnonzero(kinds == kind)), True))
     return PassQuestions(errors, (*questions, *_by_order(problem)))
 
 
@@ -197,5 +209,8 @@ def _by_order(problem: FilterProblem) -> Iterator[PlatformQuestion]:
     for kind in dict.fromkeys(kinds.tolist()):
         for words, course in shapes.items():
             yield PlatformQuestion(
-                "order", f"The values {kind} {words}", ErrorColumns(np.flatnonzero(kinds == kind), course)
+                "order",
+                f"The values {kind} {words}",
+                ErrorColumns(np.flatnonzero(kinds == kind), course),
+                kind in ("kg0", "ka0") and not words.startswith("step"),
             )
