@@ -85,31 +85,6 @@ def test_gravity_stated_so_uncertainly_that_no_filter_follows_is_said():
     assert found.message.startswith("gravity: stated so uncertainly")
 
 
-def test_what_is_taken_as_exact_has_an_unknown_effect_where_no_filter_follows(monkeypatch):
-    """An effect that is no number is said in words."""
-    true = sources.estimate
-
-    def lost(*given, **more):
-        return replace(true(*given, **more), coefficients=np.full(18, np.nan))
-
-    monkeypatch.setattr(sources, "estimate", lost)
-    recording = recorded(SHORT)
-    run = true(recording, sources.problem(SHORT), "error-state")
-    found, exact = sources.systematic(recording, SHORT, run, np.ones(18))
-    assert not found
-    assert set(exact) == {
-        "latitude",
-        "gravity",
-        "heading",
-        "tilt about north",
-        "tilt about east",
-    }
-    assert all(
-        words == f"an unknown error of {name}, as the filter does not follow it"
-        for name, words in exact.items()
-    )
-
-
 def test_the_parts_of_a_covariance_are_symmetric_and_add_up_to_it():
     """P_noise + P_prior = P of the filter, each equal to its transpose to the last digit."""
     done = calibrate(to_record(recorded(SHORT)), SHORT)

@@ -285,6 +285,9 @@ class Limits:
     reference_sigmas: float = 2.0
     """Standard uncertainties of the angle by which a late reference differs, to be named."""
 
+    reference_off: float = 4.0
+    """Root mean square of what a reference differs from the angle, over u, beyond which it is judged."""
+
     reference_spans: int = 50
     """Averages of 50 ms that a reference angle has at least for a fit of the sensors."""
 
