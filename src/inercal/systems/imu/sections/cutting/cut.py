@@ -17,7 +17,7 @@ from inercal.systems.imu.recording import coarse_steps
 from inercal.systems.imu.sections.cutting.holds import still_edges
 from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
 from inercal.systems.imu.sections.cutting.table import SectionRow
-from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.section import SENSED, Section
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +92,15 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
     read: list[_Read] = []
     unused: dict[str, str] = {}
     for stretch in stretches:
-        if stretch.row.kind in ("rest", "rate", "turn"):
+        if stretch.row.kind in SENSED:
             one = _turn(stretch) if stretch.row.kind == "turn" else _steady(stretch)
             if isinstance(one, str):
                 unused[stretch.row.section] = one
             else:
                 read.append(one)
     sections = [one.section for one in read]
-    for kinds in (("rest", "turn"), ("rate",)):
-        places = [k for k, one in enumerate(read) if one.section.kind in kinds]
+    for steady in (False, True):  # a table at a rate shakes
+        places = [k for k, one in enumerate(read) if (one.section.kind == "rate") == steady]
         for sensor in ("acc", "gyro"):
             told = [k for k in places if getattr(read[k], sensor)]
             if not told:
@@ -169,7 +169,8 @@ def stated_section(row: SectionRow) -> Section:
     begin = "start" if row.begin is None else f"{row.begin:.2f} s"
     end = "end" if row.end is None else f"{row.end:.2f} s"
     times = "" if row.begin is None and row.end is None else f", {begin} to {end}"
-    assert row.kind in ("rest", "rate", "turn")
+    assert row.kind != "move"
+    assert row.kind != "swing"
     return Section(
         kind=row.kind,
         name=row.section,
@@ -194,15 +195,16 @@ def stated_section(row: SectionRow) -> Section:
 
 
 def _steady(stretch: Stretch) -> _Read | str:
-    """A rest or a steady rate; what is wrong with it, in words. Of a rate the accelerometers are left out."""
+    """A section that is one mean; what is wrong with it, in words."""
     row = stretch.row
     if row.kind == "rate" and row.rate is None:
         return "its rate is not stated"
-    acc = stretch.acc if row.kind == "rest" else None
+    assert row.kind != "move"
+    assert row.kind != "swing"
     triads = {
         sensor: one
-        for sensor, one in (("acc", acc), ("gyro", stretch.gyro))
-        if one is not None and len(one.t)
+        for sensor, one in (("acc", stretch.acc), ("gyro", stretch.gyro))
+        if sensor in SENSED[row.kind] and one is not None and len(one.t)
     }
     clipped = [sensor for sensor, one in triads.items() if one.clipped.mean() > LIMITS.clipped_part]
     whole = {sensor: one for sensor, one in triads.items() if sensor not in clipped}
