@@ -305,6 +305,15 @@ def reference_types() -> str:
 # limits ---------------------------------------------------------------------------------------------------------------
 
 
+def section_columns() -> str:
+    """Columns of a ``sections.csv``, by the texts of the fields of a row."""
+    from inercal.systems.imu.sections.cutting import table as of_sections
+
+    meanings = _meanings(inspect.getsource(of_sections), "SectionRow")
+    rows = [(code(name), meanings[name]) for name in of_sections.COLUMNS]
+    return table(("column", "what it says"), rows)
+
+
 def limits() -> str:
     """The limits of every room that has some, a table for each; those of the systems first."""
     package, parts = Path(inercal.__file__).parent, []
@@ -403,6 +412,7 @@ PARTS: dict[str, Callable[..., str]] = {
         noise_terms,
         reference_types,
         limits,
+        section_columns,
         offers,
         public,
         words,

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from inercal.systems.selfcal.before.simulate import Experiment, experiment, simulate, to_record
 from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2
 
@@ -14,7 +15,6 @@ from inercal.faces.studies.selfcal import selfcal_study
 from inercal.foundation.findings import Status
 from inercal.foundation.inference.scores import ErrorColumns
 from inercal.systems.selfcal.before.bounds import SOURCES, recorded_bounds
-from inercal.systems.selfcal.before.simulate import Experiment, experiment, simulate, to_record
 from inercal.systems.selfcal.diagnosis.judged import answers
 from inercal.systems.selfcal.diagnosis.passed import pass_of
 from inercal.systems.selfcal.filters import error_state, whitened

@@ -187,7 +187,7 @@ COMMANDS = {
     ("simulate", "imu"): (
         "inercal.cli.simulate:simulate_imu",
         "Simulate an IMU in its sections, one after the other, or held by hand in many poses.\n\nThe study states true "
-        "coefficients under [simulation] (others are drawn). The recording goes to --out (.csv, .npz, .h5, .nc, "
+        "coefficients under [simulation], or they are drawn. The recording goes to --out (.csv, .npz, .h5, .nc, "
         ".parquet).",
         "inercal simulate imu imu.toml --seed 1 --out log.csv",
     ),

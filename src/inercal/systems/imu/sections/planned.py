@@ -15,7 +15,7 @@ from inercal.systems.imu.sections.course import CoursePiece, Pace, course
 from inercal.systems.imu.sections.cutting.cut import section_of
 from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.priors import Priors
-from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.section import SENSED, Section
 from inercal.systems.imu.settings import Simulation
 
 _SAMPLES: Final = 60
@@ -78,13 +78,11 @@ def _section(row: SectionRow, pieces: Sequence[CoursePiece], priors: Priors, of:
     rest = pieces[0].length
     acc_var = of.accelerometer_noise**2 / rest + of.accelerometer_wander**2
     gyro_var = of.gyro_noise**2 / piece.length + of.gyro_wander**2
-    section = replace(
-        section_of(row),
-        duration=piece.length,
-        gyro=rate + priors.site.vertical_rate * up[0],
-        gyro_var=np.full(3, gyro_var),
-    )
-    if row.kind == "rate":
-        return section
-    section = replace(section, acc=force[0], acc_var=np.full(3, acc_var))
+    section = replace(section_of(row), duration=piece.length)
+    sensed = SENSED[section.kind]
+    if "gyro" in sensed:
+        gyro = rate + priors.site.vertical_rate * up[0]
+        section = replace(section, gyro=gyro, gyro_var=np.full(3, gyro_var))
+    if "acc" in sensed:
+        section = replace(section, acc=force[0], acc_var=np.full(3, acc_var))
     return replace(section, acc_after=force[1]) if row.kind == "turn" else section

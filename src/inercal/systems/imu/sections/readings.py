@@ -149,9 +149,9 @@ def _groups(names: list[str]) -> tuple[tuple[str, ...], Places]:
 
 def _swung(section: Section) -> tuple[float, float]:
     """Mean cosine and sine of the angle: of a turn as told, or at a steady rate."""
-    if section.kind == "rest" or (section.kind == "turn" and section.angle == 0.0):
-        return 1.0, 0.0
     if section.kind == "rate":
         return 0.0, 0.0
+    if section.kind != "turn" or section.angle == 0.0:
+        return 1.0, 0.0
     a = section.angle
     return section.cosine_sine or (np.sin(a) / a, (1.0 - np.cos(a)) / a)

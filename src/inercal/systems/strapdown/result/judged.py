@@ -18,6 +18,7 @@ from inercal.foundation.inference.evidence import FitEvidence, of_normal_equatio
 from inercal.foundation.inference.judge import answers, asked_of, blind
 from inercal.foundation.inference.questions import Question, lagging, over_time
 from inercal.systems.strapdown.fit.batch import Fit
+from inercal.systems.strapdown.fit.unmodelled import eliminated
 from inercal.systems.strapdown.model.coefficients import (
     ALWAYS,
     GRAVITY,
@@ -30,7 +31,6 @@ from inercal.systems.strapdown.model.coefficients import (
     D,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.fit.unmodelled import eliminated
 from inercal.systems.strapdown.settings import StrapdownSettings
 
 _FAMILIES = {

@@ -22,7 +22,7 @@ from inercal.systems.imu.recording import coarse_steps
 from inercal.systems.imu.sections.cutting.holds import still_edges
 from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
 from inercal.systems.imu.sections.cutting.table import SectionRow
-from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.section import SENSED, Section
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,9 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
     variances, so that what does not average out counts. Coarse outputs add the square of a step over 12.
     """
     done: dict[int, _Read | Flaw] = {
-        k: _steady(stretch) for k, stretch in enumerate(stretches) if stretch.row.kind in ("rest", "rate")
+        k: _steady(stretch)
+        for k, stretch in enumerate(stretches)
+        if stretch.row.kind in SENSED and stretch.row.kind != "turn"
     }
     rests = [
         one.section.gyro
@@ -135,8 +137,8 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
                 Finding(one.code, f"{row.section} is not used: {one.why}.", _where(row), (), action=act)
             )
     sections = [one.section for one in read]
-    for kinds in (("rest", "turn"), ("rate",)):
-        places = [k for k, one in enumerate(read) if one.section.kind in kinds]
+    for steady in (False, True):  # a table at a rate shakes
+        places = [k for k, one in enumerate(read) if (one.section.kind == "rate") == steady]
         for sensor in ("acc", "gyro"):
             told = [k for k in places if (read[k].gyro_samples if sensor == "gyro" else read[k].acc)]
             parts = [getattr(read[k], sensor) for k in told]
@@ -208,8 +210,9 @@ def _where(row: SectionRow) -> str:
 
 
 def section_of(row: SectionRow) -> Section:
-    """A section with what its row says, and nothing read yet; of a kind rest, rate or turn."""
-    assert row.kind in ("rest", "rate", "turn")
+    """A section with what its row says, and nothing read yet; neither of a move nor of a swing."""
+    assert row.kind != "move"
+    assert row.kind != "swing"
     return Section(
         kind=row.kind,
         name=row.section,
@@ -234,15 +237,16 @@ def section_of(row: SectionRow) -> Section:
 
 
 def _steady(stretch: Stretch) -> _Read | Flaw:
-    """A rest or a steady rate; or what is wrong with it. Of a rate the accelerometers are left out."""
+    """A section that is one mean; or what is wrong with it."""
     row = stretch.row
     if row.kind == "rate" and row.rate is None:
         return Flaw("", "its rate is not stated")
-    acc = stretch.acc if row.kind == "rest" else None
+    assert row.kind != "move"
+    assert row.kind != "swing"
     triads = {
         sensor: one
-        for sensor, one in (("acc", acc), ("gyro", stretch.gyro))
-        if one is not None and len(one.t)
+        for sensor, one in (("acc", stretch.acc), ("gyro", stretch.gyro))
+        if sensor in SENSED[row.kind] and one is not None and len(one.t)
     }
     clipped = [sensor for sensor, one in triads.items() if one.clipped.mean() > LIMITS.clipped_part]
     whole = {sensor: one for sensor, one in triads.items() if sensor not in clipped}

@@ -16,6 +16,9 @@ class Limits:
     blocks_of_window: int = 4
     """Blocks of a window: windows begin at every block."""
 
+    still_for_both: float = 0.8
+    """Part of a hold of the accelerometers in which the gyro rests too, from which it is cut to that."""
+
     shortest_hold: float = 0.65
     """Shortest hold [s] that is read."""
 

@@ -31,6 +31,8 @@ def rows_of_log(
     rate = None if gyro is None else on_clock(gyro, t)
     found = holds_of(t, None if acc is None else acc.values, rate)
     holds = found.acc if acc is not None else found.gyro
+    if acc is not None:
+        holds = tuple(_still_for_both(hold, found.gyro) for hold in holds)
     turning: tuple[Dwell, ...] = ()
     if rate is not None and gyro_scale is not None:
         # a file that never stops turning looks as still as one at rest
@@ -66,6 +68,14 @@ def rows_of_log(
             )
         )
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
+
+
+def _still_for_both(hold: Dwell, of_gyro: Sequence[Dwell]) -> Dwell:
+    """A hold of the accelerometers without the begin and end of motions, which the gyro sees first: its mean and the
+    moves between holds need all of the motion outside. In a restless hand it stays as it is."""
+    both = [replace(one, start=max(one.start, hold.start), stop=min(one.stop, hold.stop)) for one in of_gyro]
+    longest = max(both, key=lambda one: one.samples, default=hold)
+    return longest if longest.samples > LIMITS.still_for_both * hold.samples else hold
 
 
 def on_clock(samples: TriadSamples, t: Array) -> Array:
