@@ -300,7 +300,7 @@ CEILINGS = {
     "names used across folders": 1460,
     "class names shared": 5,
     "constants outside Limits": 435,
-    "modules": 667,
+    "modules": 668,
 }
 
 
