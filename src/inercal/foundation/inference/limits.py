@@ -49,6 +49,9 @@ class Limits:
     part_risk: float = 1e-3
     """Probability that any part of a sound test is."""
 
+    near_zero: float = 0.05
+    """Size of a mean rate or force, as a part of the largest, below which its sign is that of noise."""
+
     tied: float = 2.8
     """Difference of predictions, in standard deviations of a reading, beyond which equal readings at an end are not one
     reading."""

@@ -16,6 +16,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.evidence import FitEvidence, of_normal_equations
 from inercal.foundation.inference.judge import answers, asked_of, blind
+from inercal.foundation.inference.limits import LIMITS
 from inercal.foundation.inference.questions import Question, lagging, over_time
 from inercal.systems.strapdown.fit.batch import Fit
 from inercal.systems.strapdown.fit.unmodelled import eliminated
@@ -191,6 +192,7 @@ def _by_reading(G: Array, rate: Array, force: Array) -> Iterator[Question]:
         top = max(float(np.abs(x).max()), 1e-300)
         size, own, bias = np.abs(x) / top, G[:, :, scales], G[:, :, biases]
         high, cubic = (size > 0.5).astype(float), size**2
+        sign = np.sign(x) * (size > LIMITS.near_zero)
         for verb, rest, columns in (
             ("differ", "above half their range", own * high[:, None]),
             (
@@ -198,7 +200,7 @@ def _by_reading(G: Array, rate: Array, force: Array) -> Iterator[Question]:
                 "over their range",
                 np.concatenate([own * size[:, None], own * cubic[:, None]], axis=2),
             ),
-            ("step", "where they change their sign", bias * np.sign(x)[:, None]),
+            ("step", "where they change their sign", bias * sign[:, None]),
         ):
             yield Question("reading", what, True, verb, rest, columns)
             alike = columns.sum(axis=2, keepdims=True)
@@ -208,7 +210,7 @@ def _by_reading(G: Array, rate: Array, force: Array) -> Iterator[Question]:
 def _by_history(G: Array, rate: Array, force: Array) -> Iterator[Question]:
     """Outputs that remember the turn before, or its load."""
     top = max(float(np.abs(rate).max()), 1e-300)
-    turning = np.abs(rate) > 0.05 * top
+    turning = np.abs(rate) > LIMITS.near_zero * top
     sense = _last(np.sign(rate) * turning)
     for what, biases in (("the biases of the gyros", D), ("the biases of the accelerometers", K0)):
         columns = G[:, :, biases]

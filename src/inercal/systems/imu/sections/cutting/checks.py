@@ -13,6 +13,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.plausible import off_scale
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.section import Section
@@ -204,6 +205,13 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
             harm=EVERYTHING,
         )
         return
+    if gyro_scale is not None and len(gains) > 1:
+        parts = np.array([gain / gyro_scale for _, gain in gains])
+        part = float(np.median(parts))
+        finding = off_scale("The gyro", f"{part:.3g} times what is stated", part, harm=EVERYTHING)
+        if finding.code == "unit_suspect" and np.ptp(parts) < LIMITS.rate_miss * part:
+            yield finding
+            return
     usual = gyro_scale if gyro_scale is not None else float(np.median([abs(gain) for _, gain in gains]))
     for one, gain in gains:
         what, unit, stated = (
