@@ -273,6 +273,9 @@ class Limits:
     settling_time: float = 2.0
     """Time [s] after the first row from which innovations and errors are judged."""
 
+    roll_u: float = math.radians(0.1)
+    """Standard uncertainty [rad] of a roll at the start that is stated without one, where it is estimated."""
+
     level_cosine: float = 0.1
     """Cosine of the roll below which gyro and axes across the body do not show pitch."""
 

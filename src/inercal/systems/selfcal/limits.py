@@ -74,6 +74,9 @@ class Limits:
     search_turn: float = math.radians(3.0)
     """Turn [rad] between two rows, at most, while a path is searched for."""
 
+    last_step: float = 0.02
+    """Part of u that the last step of a fit of several records may be; beyond it the fit has not converged."""
+
     second_prior: float = 10.0
     """Standard uncertainties of the first pass of a filter that make the prior of its second one: so far from where it
     is linearised it may go."""

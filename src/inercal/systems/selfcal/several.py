@@ -54,8 +54,6 @@ from inercal.systems.selfcal.task import Calibration, based, calibrate
 _ROUNDS = 8
 """Steps of Gauss-Newton at most."""
 
-_NEAR = 0.02
-"""Part of u that the last step may be."""
 
 _OF_ONE = ("at_prior", "goal_missed", "stated_exact", "considered")
 """Findings of a record alone that need not hold for all together."""
@@ -160,10 +158,10 @@ def fit(parts: Sequence[RecordPart]) -> RecordFit:
         u = np.sqrt(np.diag(covariance))
         size = float(np.max(np.abs(step) / u))
         about, x, width = x, x + step, np.minimum(prior, LIMITS.second_prior * u)
-        if not size > _NEAR:
+        if not size > LIMITS.last_step:
             break
     names = tuple(name for name, each in zip(states, common, strict=True) if each)
-    found = RecordFit(names, common, x, covariance, prior, said, size <= _NEAR, "")
+    found = RecordFit(names, common, x, covariance, prior, said, size <= LIMITS.last_step, "")
     return found._replace(apart=_contradiction(found, about, mean) if found.converged else "")
 
 

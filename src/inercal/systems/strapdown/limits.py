@@ -136,6 +136,9 @@ class Limits:
     path_starts: int = 5
     """Random paths that the search for a path begins with."""
 
+    level_axis: float = 20.0
+    """Angle [deg] from level, or from vertical, up to which the axis of a turn is called so."""
+
     told: float = 1.1
     """Factor by which a turn lowers the u of a coefficient that it is said to tell."""
 

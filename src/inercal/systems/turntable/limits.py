@@ -20,6 +20,13 @@ class Limits:
     most_samples: int = 10_000_000
     """Samples of a simulation that fit into memory with all errors of the table."""
 
+    runaway: float = 1e3
+    """Growth of u in the last round of weights that says that they do not settle: with the terms the weights of all
+    readings sink."""
+
+    foreseen_positions: int = 200
+    """Positions of a plan at most of which u is foreseen with better or worse errors of the table."""
+
     condition: float = 100.0
     """Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
 
