@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Kind = Literal["rest", "rate", "turn"]
+Kind = Literal["rest", "rate", "turn", "hang"]
 
 SENSED: Final[Mapping[Kind, tuple[str, ...]]] = {
     "rest": ("acc", "gyro"),
@@ -29,7 +29,8 @@ class Section:
     """
 
     kind: Kind
-    """``rest``: stands still. ``rate``: turns steadily. ``turn``: goes from rest to rest by an angle about an axis."""
+    """``rest``: stands still. ``rate``: turns steadily. ``turn``: goes from rest to rest by an angle about an axis.
+    ``hang``: hangs on a string, about which it twists."""
     name: str = ""
     """As findings and tables call it."""
     where: str = ""
