@@ -146,7 +146,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     ] = Field(
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
-        "turns by a known angle, in the words of that method; aided: on a table whose angles are in the record; means: a row of mean outputs for "
+        "turns by a known angle, in the words of that method; aided: on a table whose angles are in the record; "
+        "means: a row of mean outputs for "
         "each pose, accelerometers; known_rates: a gyro on a platter or rate table, in unknown orientations; "
         "known_turns: a gyro, a turn by a known angle about each axis; sections: rests, rates and turns, each with "
         "what is known of it",

@@ -109,7 +109,9 @@ def _outlying(found: SectionCalibration) -> Iterator[Finding]:
     """The section that lies farthest off all others, left out in turn."""
     p = found.outlying
     k = int(np.argmin(p))
-    if p[k] < IMU_LIMITS.outlier_risk / max(int(np.sum(p < 1.0)), 1):
+    if p[k] < IMU_LIMITS.outlier_risk / len(
+        p
+    ):  # it is the worst of all, whether or not the others were judged
         yield Finding(
             "outlying_section",
             f"{_section(found, k)} lies off what all other sections say (p = {p[k]:.1g}).",
