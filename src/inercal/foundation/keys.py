@@ -235,6 +235,11 @@ GONE: Mapping[tuple[str, str], str] = {
     **dict.fromkeys([("filter.kind", "mukf"), ("filter", "mukf")], "error-state"),
     **dict.fromkeys([("filter.kind", "linear"), ("filter", "linear")], "error-state"),
     **dict.fromkeys([("filter.kind", "lm"), ("filter", "lm")], "map"),
+    ("budget", "turn angle"): "angles and rates",
+    ("budget", "alignment"): "placing or axes",
+    ("budget", "time base"): "clock",
+    ("budget", "horizontal earth rate"): "earth rate, level part",
+    ("budget", "vertical earth rate"): "earth rate",
 }  # fmt: skip
 """Choices that versions up to 0.2.0 had, by key, its last word or option, and choice: what to use in their place."""
 
