@@ -114,7 +114,7 @@ CODES: dict[str, Code] = {
     "by_reading": Code("an output is distorted by its own size", _BY_SIZE, rank=26),
     "by_history": Code("readings depend on what came before", _BY_SIZE, rank=27),
     "row_order": Code("readings fit much better in another order of the rows", _ALWAYS, rank=28, gross=True),
-    "row_copies": Code("rows are exact copies of others at other inputs", _ALWAYS, rank=31),
+    "row_copies": Code("rows are exact copies of others at other inputs", _ALWAYS, rank=32),
     "coarse_output": Code("an output has steps larger than its scatter", _BY_SIZE, rank=31),
     "implausible": Code("a value is outside what it can be", _ALWAYS, rank=30),
     "large_errors": Code("errors of the table are so large that more than their squares matters", _ALWAYS),
