@@ -246,7 +246,7 @@ def _known_before(problem: FusionProblem, settings: AoaSettings) -> tuple[str, .
     )
 
 
-class _Run(NamedTuple):
+class _BudgetRun(NamedTuple):
     """One run: mean variance of theta ``angle`` [rad^2], covariance ``P`` and state ``x`` at the end, ``theta`` (k,) at
     the rows that are judged, and the ``trace`` of the filter."""
 
@@ -259,13 +259,13 @@ class _Run(NamedTuple):
 
 def _run(
     problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask, heads: bool = False
-) -> _Run:
+) -> _BudgetRun:
     """Run the fusion, with heads of blocks in its trace where they are asked for."""
     block = BLOCK if smoothed or heads else 0
     state, trace = advance(initial(problem), problem, t, rows, last=True, block=block)
     out = smooth(problem, t, rows, trace) if smoothed else trace.out
     u = out[judged & np.isfinite(out[:, 1]), 1]
-    return _Run(float(np.mean(np.square(u))), state.P, state.x, out[judged, 0], trace)
+    return _BudgetRun(float(np.mean(np.square(u))), state.P, state.x, out[judged, 0], trace)
 
 
 def _enlarged(problem: FusionProblem, rows: Array, source: BudgetSource) -> tuple[FusionProblem, Array]:

@@ -66,7 +66,8 @@ def diagnose(
             return _diagnosed(recording, problem, result, systematic)
         sums = passed.with_stated(_moved(passed, systematic))
         hits, limit = answers(sums, passed.questions)
-        if (said := explaining(sums, hits, limit, passed.constants)) is not None:
+        said = explaining(sums, passed.z, hits, limit, passed.constants)
+        if said is not None and _fair(problem, problem, result) is problem:
             return [said]
         if not sound(passed.final):
             return _diagnosed(recording, problem, result, systematic)

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.limits import LIMITS as OF_JUDGE
 from inercal.foundation.inference.scores import ErrorScore, PassSums
@@ -49,10 +50,9 @@ def answers(sums: PassSums, questions: Sequence[PlatformQuestion]) -> tuple[list
 def speaking(sums: PassSums, hits: Sequence[Answer], limit: float, names: Sequence[str]) -> Finding | None:
     """The finding of the question that speaks, of values of some names: of those as likely as the likeliest that one
     beside which least is still there, then the one of fewest parameters."""
-    if not hits:
+    alike = _as_likely(hits)
+    if not alike:
         return None
-    least = OF_JUDGE.as_likely * math.log(max(hits[0].score.chance, 1e-300))
-    alike = [hit for hit in hits if math.log(max(hit.score.chance, 1e-300)) <= least][: OF_JUDGE.compared]
 
     def left(k: int) -> int:
         rest = (
@@ -83,20 +83,32 @@ def speaking(sums: PassSums, hits: Sequence[Answer], limit: float, names: Sequen
     )
 
 
-def explaining(sums: PassSums, hits: Sequence[Answer], limit: float, names: Sequence[str]) -> Finding | None:
-    """The finding of a question that speaks and explains all: nothing else is still there beside it, innovations are of
-    the stated size without it, and no hypothesis says it with a value; None of any other."""
-    if not hits:
+def explaining(
+    sums: PassSums, z: Array, hits: Sequence[Answer], limit: float, names: Sequence[str]
+) -> Finding | None:
+    """The finding of a question that speaks and explains all: nothing else is still there beside it, innovations ``z``
+    (n - 1, 6) are of the stated size without it, and not more alike from row to row than it makes them; None of any
+    other, and where a question is as likely that a hypothesis answers with a value."""
+    alike = _as_likely(hits)
+    if not alike or any(hit.question.named for hit in alike):
         return None
-    excess = sums.chi2 - sums.dof
-    spread = LIMITS.nis_sigmas * math.sqrt(2.0 * sums.dof)
-    for hit in hits[: OF_JUDGE.compared]:
-        if excess - hit.score.explained > spread:
-            return None
+    excess, spread = sums.chi2 - sums.dof, LIMITS.nis_sigmas * math.sqrt(2.0 * sums.dof)
+    serial, scatter = float(np.nansum(z[1:] * z[:-1])), LIMITS.nis_sigmas * math.sqrt(sums.dof)
+    for hit in alike:
+        if max((excess - hit.score.explained) / spread, (serial - hit.score.explained) / scatter) > 1.0:
+            continue
         rest = (sums.ask(other.question.columns, hit.question.columns) for other in hits if other is not hit)
         if all(score is None or score.chance >= limit for score in rest):
-            return None if hit.question.named else speaking(sums, hits, limit, names)
+            return speaking(sums, hits, limit, names)
     return None
+
+
+def _as_likely(hits: Sequence[Answer]) -> list[Answer]:
+    """Hits about as likely as the first, at most so many as are compared."""
+    if not hits:
+        return []
+    least = OF_JUDGE.as_likely * math.log(max(hits[0].score.chance, 1e-300))
+    return [hit for hit in hits if math.log(max(hit.score.chance, 1e-300)) <= least][: OF_JUDGE.compared]
 
 
 def _item(kind: str, answer: Answer) -> dict[str, str | float]:

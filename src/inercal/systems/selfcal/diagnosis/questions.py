@@ -212,5 +212,5 @@ def _by_order(problem: FilterProblem) -> Iterator[PlatformQuestion]:
                 "order",
                 f"The values {kind} {words}",
                 ErrorColumns(np.flatnonzero(kinds == kind), course),
-                kind in ("kg0", "ka0") and not words.startswith("step"),
+                kind in ("kg0", "ka0"),
             )
