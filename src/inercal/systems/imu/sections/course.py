@@ -98,7 +98,7 @@ def course(rows: Sequence[SectionRow], pace: Pace, rng: np.random.Generator | No
 
 def _lost(row: SectionRow) -> bool:
     """True of a rest in a direction that nobody knows."""
-    return row.kind in ("rest", "hang") and row.up is None and row.force is None
+    return row.kind == "rest" and row.up is None and row.force is None
 
 
 def _way(before: CoursePiece, after: CoursePiece, moves: Sequence[SectionRow], pace: Pace) -> CoursePiece:
@@ -131,9 +131,6 @@ def _of(row: SectionRow, pace: Pace, placed: _Placed) -> Iterator[CoursePiece]:
             one = replace(piece, length=_SWAY, q=q, step=_SWAY * placed.normal(_SWING), smooth=False)
             yield one
             q = one.end
-        return
-    if row.kind == "hang":
-        yield replace(piece, q=placed.upright(placed.up(row)), step=np.pi * placed.up(row), smooth=False)
         return
     axis, up = placed.axis_and_up(row)
     q = placed.upright(up)

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Kind = Literal["rest", "rate", "turn", "hang"]
+Kind = Literal["rest", "rate", "turn"]
 
 SENSED: Final[Mapping[Kind, tuple[str, ...]]] = {
     "rest": ("acc", "gyro"),
     "rate": ("gyro",),
     "turn": ("acc", "gyro"),
-    "hang": ("acc",),
 }
 """Sensors whose means count in a section of each kind: at a rate a lever arm adds to the accelerometers."""
 
@@ -30,8 +29,7 @@ class Section:
     """
 
     kind: Kind
-    """``rest``: stands still. ``rate``: turns steadily. ``turn``: goes from rest to rest by an angle about an axis.
-    ``hang``: hangs on a string, about which it twists."""
+    """``rest``: stands still. ``rate``: turns steadily. ``turn``: goes from rest to rest by an angle about an axis."""
     name: str = ""
     """As findings and tables call it."""
     where: str = ""

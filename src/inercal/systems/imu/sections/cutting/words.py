@@ -93,9 +93,6 @@ def claim(name: str) -> Claim:
 def _concluded(facts: _Facts) -> Claim:
     """The claim that follows from what stands in a name."""
     still = bool(facts.words & _STILL)
-    if facts.words & {"hang", "hanging"} and len(facts.axes) == 1:
-        (hung,) = facts.axes
-        return Claim("hang", f"{'+-'[(facts.side or facts.sign) < 0]}{hung}")
     if len(facts.axes) != 1:
         return Claim("rest") if still and not facts.axes and not facts.words & (_TURN | _RATE) else Claim()
     (letter,) = facts.axes
