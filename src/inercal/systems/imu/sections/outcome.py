@@ -29,6 +29,7 @@ from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
+from inercal.systems.imu.sections.effects import effects_of
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
@@ -42,9 +43,8 @@ from inercal.systems.imu.sections.shorthands import (
     word_of,
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
-from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -130,8 +130,7 @@ def calibrate_from_sections(
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
-    if isinstance(options, KnownRatesSettings):
-        findings = (*findings, *trend_findings(found))
+    findings = (*findings, *effects_of(found, in_order=method == "known_rates"))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
     estimate = replace(estimate, result={**estimate.result, "method": method})
     return CalibrationFromSections(timed(estimate, clock), sections, found)
