@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import PurePath
 from typing import Any
 
@@ -30,6 +31,7 @@ from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import stated_rows
+from inercal.systems.imu.sections.effects import effects_of
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
@@ -43,9 +45,8 @@ from inercal.systems.imu.sections.shorthands import (
     word_of,
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
-from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -96,7 +97,7 @@ def calibrate_from_sections(
         refuse_samples(named)
         proposal = proposal_of(named, options, settings.exclude)
         proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
-        judged = trend_findings if isinstance(options, KnownRatesSettings) else _nothing_more
+        judged = partial(effects_of, in_order=isinstance(options, KnownRatesSettings))
         kept = list(named.values())
         found = of_proposal(
             proposal, kept, settings, temperature=temperature, judged=judged, progress=progress

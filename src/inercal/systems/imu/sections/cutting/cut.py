@@ -24,6 +24,9 @@ from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
 from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.section import SENSED, Section
 
+ENDS = (", before", ", after")
+"""Ends of the names of the rests before and after a turn, behind the name of the turn."""
+
 
 @dataclass(frozen=True, eq=False)
 class TriadSamples:
@@ -329,10 +332,10 @@ def _ends_of(turn: _Read) -> list[_Read]:
     """The rests before and after a turn of a gyro alone, which tell its bias."""
     step = turn.section.duration / max(turn.gyro_samples - 1, 1)
     ends = []
-    for values, end in zip(turn.gyro, ("before", "after"), strict=True):
+    for values, end in zip(turn.gyro, ENDS, strict=True):
         rest = Section(
             "rest",
-            name=f"{turn.section.name}, {end}",
+            name=f"{turn.section.name}{end}",
             where=turn.section.where,
             why=turn.section.why,
             gyro=values.mean(axis=0),
