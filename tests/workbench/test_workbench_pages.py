@@ -211,7 +211,7 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     found["status"]["message"] += "; or take `inercal calibrate strapdown`"
     job.result.write_text(json.dumps(found))
     await user.open(f"/sessions/{session.id}/result")
-    await user.should_see("ok: 33 coefficients")
+    await user.should_see("ok: 36 coefficients")
     user.find("imucal").click()
     await user.should_see("imucal.json", retries=200)
     (written,) = bench.root.glob("jobs/*/imucal.json")
