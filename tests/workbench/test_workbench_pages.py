@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import tomllib
 
 import pytest
@@ -147,6 +148,28 @@ async def test_columns_are_chosen_added_and_taken_out(user, bench):
     user.find("Add").click()
     await until(lambda: columns().get("temperature") == {"from": "warmth", "unit": "degC"})
     assert bench.look(bench.sessions.get(session.id))[0].record["temperature"].values[0] == 21.0
+
+
+@of_user
+async def test_a_guess_is_answered_by_a_choice(user, bench):
+    session = bench.sessions.begin("still")
+    noise = [0.001 * math.sin(k * k + 0.3) for k in range(120)]
+    rows = "".join(
+        f"{0.01 * k:.2f},{noise[k]:.9f},{noise[k + 40]:.9f},{noise[k + 80]:.9f}\n" for k in range(40)
+    )
+    (session.folder / "log.csv").write_text("time,gx,gy,gz\n" + rows)
+    await user.open(f"/sessions/{session.id}/recording?new=1")
+    await user.should_see("Is the gyro in", retries=60)
+    user.find(kind=ui.button, content="mdeg/s").click()
+    column_map = session.folder / "study-map.toml"
+    for _ in range(60):
+        await asyncio.sleep(0.05)
+        columns = tomllib.loads(column_map.read_text())["columns"]
+        if columns["gyro_z"]["grade"] == "certain":
+            break
+    assert {(columns[f"gyro_{axis}"]["unit"], columns[f"gyro_{axis}"]["grade"]) for axis in "xyz"} == {
+        ("mdeg/s", "certain")
+    }
 
 
 @of_user

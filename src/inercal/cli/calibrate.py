@@ -46,9 +46,7 @@ def calibrate_imu(
     *,
     study: Annotated[
         Path | None,
-        Parameter(
-            help="Study file (TOML); `inercal new` writes one. Without one the recording tells the method."
-        ),
+        Parameter(help="Study file (TOML); `inercal new` writes one."),
     ] = None,
     map_file: MapFile = None,
     latitude: Latitude = None,

@@ -12,18 +12,12 @@ from cyclopts import Parameter
 from inercal.cli import process_age, show
 from inercal.cli.options import FileOutput, Overrides, ResultOutput, reading
 from inercal.cli.outcome import WHOLE, hand_over, tell
+from inercal.cli.records_in import Answers
 from inercal.foundation.errors import InputError
 
 Rate = Annotated[
     str | None,
     Parameter(help='Sample rate of recordings without a time column, for the map: "100 Hz", "100.00(1) Hz".'),
-]
-Answers = Annotated[
-    list[str] | None,
-    Parameter(
-        name="--answer",
-        help="Answer to what a recording does not say: gyro=deg/s, gyro=none. May be repeated.",
-    ),
 ]
 Recordings = Annotated[list[Path] | None, Parameter(help="Recordings, to guess a column map from.")]
 

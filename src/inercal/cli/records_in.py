@@ -29,6 +29,15 @@ MapFile = Annotated[
 ]
 
 
+Answers = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--answer",
+        help="Answer to what a recording does not say: gyro=deg/s, rate=95 Hz, gyro=none. May be repeated.",
+    ),
+]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Span:
@@ -40,13 +49,7 @@ class Span:
     end: Annotated[
         str | None, Parameter(help='Leave out what comes after, such as "30 min" after the first stamp.')
     ] = None
-    answers: Annotated[
-        list[str] | None,
-        Parameter(
-            name="--answer",
-            help="Answer to what a recording does not say: gyro=deg/s, rate=95 Hz, gyro=none. May be repeated.",
-        ),
-    ] = None
+    answers: Answers = None
 
     def check(self) -> None:
         """Refuse a time that is none, before anything is read; raises `InputError`."""

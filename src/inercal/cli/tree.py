@@ -73,7 +73,7 @@ COMMANDS = {
         "Calibrate an IMU held by hand, set on its sides and turned, or turned by a table.\n\nGives bias, scale factor "
         "and misalignment of the accelerometers, and of the gyro if there is one, with uncertainties; of repeat runs "
         "the combined values; of the methods known_rates and known_turns FILEs are in order, one "
-        "for each rate or turn. "
+        "for each rate or turn. Without --study the recording tells the method, and --latitude the site. "
         "--out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: done, but the verdict is "
         "not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",

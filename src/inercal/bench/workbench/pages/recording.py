@@ -136,9 +136,10 @@ class Columns:
                 for unit in choices(str(entry.get("unit", ""))):
                     button(unit, partial(self.answer, paths, unit))
 
-    async def answer(self, paths: Sequence[str], unit: str) -> None:
-        """The channels of a sensor have the unit that was chosen."""
-        said = {"unit": toml(unit), "grade": '"certain"', "because": '"as answered"', "question": ""}
+    async def answer(self, paths: Sequence[str], unit: str, recognised: bool = True) -> None:
+        """The channels of a sensor have the unit that was chosen; those ``recognised`` are certain then."""
+        said = {"unit": toml(unit)}
+        said |= {"grade": '"certain"', "because": '"as answered"', "question": ""} if recognised else {}
         await self.write({f"{path}.{key}": value for path in paths for key, value in said.items()})
         self.fill()
 
@@ -148,11 +149,10 @@ class Columns:
         taken = toml(entry.get("from"))
 
         async def column(chosen: str) -> None:
-            if chosen == _NONE:
-                await self.write({path: ""})
-                self.fill()
-            else:
-                await self.change(f"{path}.from", chosen, "value")
+            if chosen != _NONE:
+                return await self.change(f"{path}.from", chosen, "value")
+            await self.write({path: ""})
+            return self.fill()
 
         def origin() -> None:
             columns = [_NONE, *dict.fromkeys([taken, *part.there])]
@@ -164,7 +164,7 @@ class Columns:
         def unit() -> None:
             field = ui.input(value=str(entry.get("unit", ""))).props(f'dense aria-label="unit of {name}"')
             field.classes("w-28")
-            field.on("change", lambda: self.change(f"{path}.unit", field.value, "text"))
+            field.on("change", lambda: self.answer([path], field.value, bool(entry.get("grade"))))
 
         def sign() -> None:
             ui.select(
