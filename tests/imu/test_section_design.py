@@ -102,3 +102,10 @@ def test_a_table_alone_is_a_study(tmp_path, monkeypatch, capsys):
     assert design("imu.toml").estimate.result["predicted"] == result["predicted"]
     assert run(["calibrate", "imu", "log.csv", "--study", "sections.csv"]) == 2
     assert "fill in site.latitude" in capsys.readouterr().err
+
+
+def test_a_study_without_sections_is_judged_by_its_poses_in_the_hand(tmp_path):
+    settings = study_of(tmp_path, HEAD + SIDES)
+    designed = judge(settings, type(settings.method)())
+    assert designed.count == settings.simulation.poses
+    assert not {"S_x", "S_y", "S_z", "K0_x"} & set(designed.foretold.by_prior)

@@ -63,7 +63,7 @@ def design(study: Study) -> Result:
     from inercal.systems.imu.sections.design import design as judge
 
     settings = study.settings
-    options = settings.method
+    options = SectionsSettings() if settings.method is None else settings.method
 
     def judged() -> DesignedSections:
         if not isinstance(options, SectionsSettings):

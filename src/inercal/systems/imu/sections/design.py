@@ -192,8 +192,11 @@ class DesignedSections:
 
 
 def design(settings: ImuSettings, options: SectionsSettings) -> DesignedSections:
-    """Judge the sections that a study states. Raises `StudyError` without any, and for one that cannot be planned."""
-    table = stated_rows(options)
+    """Judge the sections that a study states; without any, poses in the hand with moves between them.
+
+    Raises `StudyError` for one that cannot be planned.
+    """
+    table = stated_rows(options) or _in_the_hand(settings.simulation.poses)
     if not any(row.kind not in ("swing", "move") for row in table):
         raise StudyError("imu.sections", "found no rest, rate or turn, expected a table of sections to judge")
     sizes = {sensor: Size(1.0, 0.05) for sensor in ("acc", "gyro")}
@@ -217,6 +220,12 @@ def design(settings: ImuSettings, options: SectionsSettings) -> DesignedSections
     return DesignedSections(
         len(plan.sections), told, tuple(sorted(candidates, key=lambda one: one.mean)), lacking
     )
+
+
+def _in_the_hand(poses: int) -> tuple[SectionRow, ...]:
+    """Rests of which nothing is known, and moves between them."""
+    pairs = ((SectionRow(f"rest {k}"), SectionRow(f"move {k}", kind="move")) for k in range(1, poses + 1))
+    return tuple(itertools.chain.from_iterable(pairs))[:-1]
 
 
 def _extras(plan: Planned, priors: Priors) -> tuple[Any, ...]:
