@@ -46,7 +46,7 @@ from inercal.systems.imu.sections.shorthands import (
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
