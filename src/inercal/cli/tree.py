@@ -187,8 +187,7 @@ COMMANDS = {
     ("simulate", "imu"): (
         "inercal.cli.simulate:simulate_imu",
         "Simulate an IMU in its sections, one after the other, or held by hand in many poses.\n\nThe study states true "
-        "coefficients under [simulation], or they are drawn. The recording goes to --out (.csv, .npz, .h5, .nc, "
-        ".parquet).",
+        "coefficients under [simulation], or they are drawn. The recording goes to --out (.csv, .npz, .h5, .nc, ...).",
         "inercal simulate imu imu.toml --seed 1 --out log.csv",
     ),
     ("simulate", "strapdown"): (

@@ -46,8 +46,7 @@ def calibrate(
         Needed for all but an IMU; of that, ``latitude`` (and ``height``) or
         ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
     method : str, optional
-        Of an IMU without a study: ``"multiposition"``, ``"ferraris"``, ``"aided"`` or ``"means"``; absent,
-        ``"ferraris"`` of a record with labelled sections, else ``"multiposition"``.
+        Of an IMU without a study; absent, ``"ferraris"`` of labelled sections, else ``"multiposition"``.
     compare : bool
         Also run the other estimators of a platform, or the other methods of an angle of attack.
     progress : callable

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -18,29 +17,15 @@ from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.bends import bend
+from inercal.systems.imu.sections.fit import Fit, fitted, noise_of, rounded
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
-from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
-from inercal.systems.imu.sections.readings import Flags, SectionArrays
-from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
+from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of
+from inercal.systems.imu.sections.readings import Flags
+from inercal.systems.imu.sections.scatters import half_widths, nodes
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.solve import FAR, NEAR, solved
-from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, K1, SWIVEL, TILT, S
-
-SOFTENED: Final = (1e-3, 3e-5, 1e-6)
-"""Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
-tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
-
-_SETTLED: Final = 0.02
-_SHORTENED: Final = 1e-8
-"""Changes of the logarithms of scatters, and of the parts that tilts take from lengths, that end their rounds."""
-_FINEST: Final = 1e-9
-"""Noise of means, as a part of the largest output, that counts at least: rounding rules below."""
-
-_SOFT: Final = 100.0
-"""Growth of a variance up to which it makes no other valley."""
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON
 
 
 @short_repr
@@ -125,18 +110,6 @@ class SectionCalibration:
         return tuple(f"T - M {pair}" for pair in pairs), A @ self.x, A @ self.covariance @ A.T
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A fit: the problem with its classes, the point, the linear problem there, and the likeliest variances."""
-
-    problem: Problem
-    point: Iterate
-    linear: Linear
-    z: Array
-    spread: Array
-    converged: bool
-
-
 def calibrate_sections(
     sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...] = ()
 ) -> SectionCalibration:
@@ -206,7 +179,7 @@ def _calibrated(
     sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...], start: Iterate | None = None
 ) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    fit = _fit(_rounded(problem_of(sections, priors, extras)), start)
+    fit = fitted(rounded(problem_of(sections, priors, extras)), start)
     rest, covariance = fit.linear.left(fit.z, fit.linear.at(fit.z))[0]
     agreement = of_sensors(fit.problem, rest, covariance)
     new = {sensor for sensor, p in agreement.items() if p < LIMITS.contradiction} - priors.excess
@@ -216,101 +189,7 @@ def _calibrated(
     return _result(fit, agreement)
 
 
-def _fit(problem: Problem, start: Iterate | None) -> _Fit:
-    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes; from ``start`` on
-    where a point near the solution is known.
-
-    Where noise is far below what coefficients and tilts do together, the valley of the sum of squares is too bent for
-    the search; what they take from lengths then counts as noise, and once more as curvature: u is on the safe side.
-    """
-    fitted = _fit_by(problem, start, whole=False)
-    return fitted if fitted.converged else _fit_by(problem, None, whole=True)
-
-
-def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> _Fit:
-    """Solve; ``whole``: what coefficients leave open of tilts counts as noise as well."""
-    z = np.array([np.log(size.median) for size in problem.sizes.values()])
-    point = first_guess(problem) if start is None else start
-    spread, noise = np.eye(len(z)), _noise(problem, point, z)
-    problem = with_classes(problem, noise)
-    for part in SOFTENED if start is None else ():
-        softer = softened(problem, part)
-        if softer is not None:
-            point, _, _ = solved(softer, point, z)
-    damping = FAR if start is None else NEAR
-    for _ in range(3):
-        point, linear, converged = solved(problem, point, z, damping)
-        damping = NEAR if converged else FAR
-        before, (z, spread) = z, mode(linear, z)
-        least_known = z + 2.0 * np.linalg.norm(
-            spread, axis=1
-        )  # a scatter that may be small makes no fine instrument
-        problem = with_classes(problem, _noise(problem, point, least_known))
-        short = point.short
-        point = shortened(problem, point, linear, linear.at(z), z, whole=whole)
-        change = np.max(np.abs(point.short - short), initial=0.0)
-        if converged and np.max(np.abs(z - before), initial=0.0) < _SETTLED and change < _SHORTENED:
-            break
-    point, linear, converged = solved(problem, point, z, damping)
-    return _Fit(problem, point, linear, z, spread, converged)
-
-
-def _rounded(problem: Problem) -> Problem:
-    """The problem with the noise of rounding in all outputs, which those of an exact simulation have as well."""
-    r = problem.readings
-    return replace(
-        problem, readings=replace(r, variance=np.maximum(r.variance, (_FINEST * _largest(r)) ** 2))
-    )
-
-
-def _largest(readings: SectionArrays) -> Array:
-    """Largest outputs (3, 1) of the kinds of outputs."""
-    y, seen = np.abs(readings.y), readings.seen
-    sizes = [np.max(y[:, kinds][seen[:, kinds]], initial=0.0) for kinds in ([0, 1], [2])]
-    return np.array(sizes)[[0, 0, 1], None]
-
-
-def softened(problem: Problem, part: float) -> Problem | None:
-    """The problem with a noise of means of at least this ``part`` of the largest outputs; None where it is no less."""
-    r = problem.readings
-    least = (part * _largest(r)) ** 2
-    softer = np.where(r.stated, np.maximum(r.variance, least), r.variance)
-    if np.all(softer <= _SOFT * r.variance):
-        return None
-    return replace(problem, readings=replace(r, variance=softer))
-
-
-def _noise(problem: Problem, point: Iterate, z: Array) -> dict[str, float]:
-    """Scatter of the means of each sensor [SI], stated or found."""
-    scatter = dict(zip(problem.sizes, np.exp(z), strict=True))
-    r, out = problem.readings, {}
-    for name, kinds in (("acc", slice(0, 2)), ("gyro", slice(2, 3))):
-        variance = (r.variance / np.array([point.x[K1], point.x[K1], point.x[S]]) ** 2)[:, kinds]
-        for label, on in problem.on.items():
-            if label.split()[0] == name:
-                variance = variance + on[:, kinds] * scatter[label] ** 2
-        if r.seen[:, kinds].any():
-            out[name] = float(np.sqrt(np.median(variance[r.seen[:, kinds]])))
-    return out
-
-
-def shortened(
-    problem: Problem, point: Iterate, linear: Linear, solution: ArrowSolution, z: Array, *, whole: bool
-) -> Iterate:
-    """The point with the mean and the variance of the part by which tilts that a section leaves open, within a known
-    placing, shorten what acts along a direction: (d1^2 + d2^2)/2. What coefficients leave open is for `bend`,
-    unless the ``whole`` is taken."""
-    variance, sd = np.zeros(len(problem.sd)), np.zeros(len(problem.sd))
-    variance[linear.local] = solution.local_variance if whole else np.diag(solution.given)
-    sd[linear.local] = linear.sd(z)[len(linear.shared) :]
-    left = np.where(np.isfinite(problem.local(sd)), problem.local(variance), 0.0)[problem.readings.leader]
-    parts = [left[:, TILT], left[:, SWIVEL]]
-    short = np.stack([0.5 * part.sum(axis=1) for part in parts], axis=1)
-    loss = np.stack([0.5 * np.sum(part**2, axis=1) for part in parts], axis=1)
-    return replace(point, short=short, loss=loss)
-
-
-def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
+def _result(fit: Fit, agreement: dict[str, float]) -> SectionCalibration:
     """Mean and covariance over what is left open of the variances, with 95 % limits of the mixture."""
     problem, linear, x = fit.problem, fit.linear, fit.point.x
     count = int(np.sum(linear.shared < len(COEFFICIENTS)))
@@ -368,7 +247,7 @@ def _result(fit: _Fit, agreement: dict[str, float]) -> SectionCalibration:
             name: float((z[k] - np.log(s.median)) / s.spread)
             for k, (name, s) in enumerate(problem.sizes.items())
         },
-        noise=_noise(problem, fit.point, z),
+        noise=noise_of(problem, fit.point, z),
         chi2=best.chi2,
         freedom=freedom,
         probability=float(chdtrc(freedom, best.chi2)) if freedom > 0.0 else 1.0,

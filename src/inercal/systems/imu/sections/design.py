@@ -23,9 +23,10 @@ from inercal.foundation.results.shown import Table, heads, short
 from inercal.foundation.units import Quantity
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.sections.arrow import Linear
-from inercal.systems.imu.sections.calibration import ruled_by_prior, shares_of, shortened
+from inercal.systems.imu.sections.calibration import ruled_by_prior, shares_of
 from inercal.systems.imu.sections.course import Pace
 from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of, stated_rows
+from inercal.systems.imu.sections.fit import shortened
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.missing import Missing, missing
 from inercal.systems.imu.sections.moves import move_rows

@@ -13,7 +13,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.sections.arrow import Linear
-from inercal.systems.imu.sections.calibration import SOFTENED, softened
+from inercal.systems.imu.sections.fit import SOFTENED, softened
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.priors import Priors
