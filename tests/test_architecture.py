@@ -269,8 +269,7 @@ def test_rooms_within_a_system_stand_on_each_other(system):
 
 def test_methods_of_an_imu_do_not_know_each_other():
     methods = {
-        f"inercal.systems.imu.{method}"
-        for method in ("multiposition", "aided", "sections", "temperature")
+        f"inercal.systems.imu.{method}" for method in ("multiposition", "aided", "sections", "temperature")
     }
 
     def method_of(module):

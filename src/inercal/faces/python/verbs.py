@@ -43,8 +43,7 @@ def calibrate(
         One run; several are repeat runs of an IMU, a strapdown unit, a table or a platform, which are combined, or of
         the methods ``known_rates`` and ``known_turns`` of an IMU one for each rate or turn, in order.
     study : Study or path, optional
-        Needed for all but an IMU; of that, ``latitude`` (and ``height``) or
-        ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
+        Of an IMU ``latitude`` (and ``height``) or ``gravity`` can take its place: ``"48 deg"``, ``"9.81744(2) m/s^2"``.
     method : str, optional
         Of an IMU without a study; absent, ``"ferraris"`` of labelled sections, else ``"multiposition"``.
     compare : bool

@@ -17,7 +17,7 @@ from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.bends import bend
-from inercal.systems.imu.sections.fit import Fit, fitted, noise_of, rounded
+from inercal.systems.imu.sections.fit import FittedSections, fitted, noise_of, rounded
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
@@ -189,7 +189,7 @@ def _calibrated(
     return _result(fit, agreement)
 
 
-def _result(fit: Fit, agreement: dict[str, float]) -> SectionCalibration:
+def _result(fit: FittedSections, agreement: dict[str, float]) -> SectionCalibration:
     """Mean and covariance over what is left open of the variances, with 95 % limits of the mixture."""
     problem, linear, x = fit.problem, fit.linear, fit.point.x
     count = int(np.sum(linear.shared < len(COEFFICIENTS)))

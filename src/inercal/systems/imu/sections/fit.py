@@ -31,7 +31,7 @@ _SOFT: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class FittedSections:
     """A fit: the problem with its classes, the point, the linear problem there, and the likeliest variances."""
 
     problem: Problem
@@ -42,7 +42,7 @@ class Fit:
     converged: bool
 
 
-def fitted(problem: Problem, start: Iterate | None) -> Fit:
+def fitted(problem: Problem, start: Iterate | None) -> FittedSections:
     """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes; from ``start`` on
     where a point near the solution is known.
 
@@ -53,7 +53,7 @@ def fitted(problem: Problem, start: Iterate | None) -> Fit:
     return fitted if fitted.converged else _fit_by(problem, None, whole=True)
 
 
-def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> Fit:
+def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> FittedSections:
     """Solve; ``whole``: what coefficients leave open of tilts counts as noise as well."""
     z = np.array([np.log(size.median) for size in problem.sizes.values()])
     point = first_guess(problem) if start is None else start
@@ -78,7 +78,7 @@ def _fit_by(problem: Problem, start: Iterate | None, *, whole: bool) -> Fit:
         if converged and np.max(np.abs(z - before), initial=0.0) < _SETTLED and change < _SHORTENED:
             break
     point, linear, converged = solved(problem, point, z, damping)
-    return Fit(problem, point, linear, z, spread, converged)
+    return FittedSections(problem, point, linear, z, spread, converged)
 
 
 def rounded(problem: Problem) -> Problem:
