@@ -21,6 +21,8 @@ SILENT = (
     "For inertial-test engineers",
     "Lay the IMU on each",
     "Then",
+    "Or, to look over",
+    "says what it took for what",
     "And around it:",
     "Tutorials:",
     "How to:",

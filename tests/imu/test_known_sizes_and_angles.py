@@ -339,7 +339,7 @@ def test_orientations_in_a_plane_leave_a_scale_factor_open_and_say_so():
     flat /= np.linalg.norm(flat, axis=1, keepdims=True)
     estimate = by_rates([outputs(rate * flat) + 0.5 * rng.normal(size=flat.shape) for rate in RATES])
     assert estimate.status is Status.UNOBSERVABLE
-    assert estimate.message == "the sections leave S_z open: add a rate or turn about z"
+    assert estimate.message == "the sections leave S_z open: add a rate, or a turn by a known angle, about z"
 
 
 def test_labels_of_one_file_are_the_turns():

@@ -141,7 +141,8 @@ def test_counts_of_a_gyro_that_never_turned_about_an_axis_name_the_turn_to_add(t
     record, _ = simulate_sections(settings, settings.method, 0.8, np.random.default_rng(4))
     found = calibrate_from_sections([record], settings, settings.method).estimate
     assert (
-        found.message == "the sections leave S_x, S_y open: add a turn by a known angle about x and about y"
+        found.message
+        == "the sections leave S_x, S_y open: add a rate, or a turn by a known angle, about x, y"
     )
     settings = study_of(tmp_path, HEAD + SIDES)
     inside, count = covered(settings, 2)

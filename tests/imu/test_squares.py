@@ -148,7 +148,7 @@ def test_a_study_states_k2(imu, expected):
 @for_each(
     ("imu", "sentence"),
     [
-        ({"k2": "30(5) ug/g^2"}, "expected true or 0 with an uncertainty"),
+        ({"k2": "30(5) ug/g^2"}, "expected true, false or 0 with an uncertainty"),
         ({"k2": "0(50) m"}, "imu.k2"),
         ({"k2": True, "method": "ferraris"}, "do not tell K2 from K0"),
         ({"k2": "0(50) ug/g^2", "method": "aided"}, "expected true or false"),

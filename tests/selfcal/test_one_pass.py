@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from inercal.systems.selfcal.before.simulate import Experiment, experiment, simulate, to_record
 from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2
 
@@ -23,6 +22,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.platform.states import ALL, KIND_OF
 from inercal.systems.selfcal.result.budget import bounds_of
+from inercal.systems.selfcal.simulate import Experiment, experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 SEED = 20261127

@@ -82,6 +82,8 @@ def calibrate_ferraris(
     if _run_into_each_other(nine, record):
         record = _with_a_clock_that_goes_on(record)
         nine = nine_sections(record, file, options)
+    if options.sections:
+        record = replace(record, labels=())  # the study names other rows
     proposal = Proposal.by(with_moves_between(nine.rows), {file: record})
     moves = [one.move for one in proposal.moves]
     sense = sense_of(proposal.sections, moves, 1.0 / record.triad("gyro").rate)

@@ -154,10 +154,6 @@ def of_proposal(
         return without(Status.TOO_FEW_INTERVALS, text)
     priors = _priors(settings, units, backward=backward)
     lacking = missing(sections, priors)
-    if lacking is not None and all(name.startswith("S_") for name in lacking.terms):
-        # rests show too little of Earth's rate: moves tell the scale of the gyro, or nothing does
-        priors = replace(priors, scale_by_earth=False)
-        lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
         return without(Status.UNOBSERVABLE, f"the sections leave {what} open: add {lacking.cure}")

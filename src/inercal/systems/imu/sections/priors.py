@@ -48,7 +48,5 @@ class Priors:
     """Change of the bias of accelerometers from session to session [m/s^2]."""
     gyro_session: Size = field(default=Size(math.radians(0.02), 2.0))
     """The same of the gyro [rad/s]."""
-    scale_by_earth: bool = True
-    """False: rests show too little of earth rate to tell the scale of a gyro in counts."""
     excess: frozenset[str] = frozenset()
     """Sensors, ``acc`` and ``gyro``, whose means scatter beyond their stated noise."""

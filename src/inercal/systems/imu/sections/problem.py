@@ -264,7 +264,7 @@ def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) 
         mean[column] = 1.0
         if scale is not None:
             mean[column], sd[column] = scale.median, abs(scale.median) * scale.spread
-    if not rotated and (site.latitude is None or not priors.scale_by_earth):
+    if not rotated and (site.latitude is None or priors.gyro_scale is None):
         sd[S] = sd[T] = 0.0  # no rate at all: biases alone, and G where outputs have a unit
         if priors.gyro_scale is None:
             sd[G] = 0.0

@@ -93,9 +93,6 @@ class PassQuestions:
 
 def _signals(recording: Recording, problem: FilterProblem) -> RowSignals:
     """The signals of a recording."""
-    from scipy.ndimage import uniform_filter1d
-    from scipy.signal import lfilter
-
     t, th = recording.t, np.array(recording.th)
     for j in range(3):
         ok = np.isfinite(th[:, j])
@@ -106,16 +103,28 @@ def _signals(recording: Recording, problem: FilterProblem) -> RowSignals:
     square = np.einsum("kji,kjl->kil", joints, joints) + 1e-6 * np.eye(3)  # no infinite speed at gimbal lock
     speed = np.linalg.solve(square, np.einsum("kji,kj->ki", joints, w - earth)[:, :, None])[:, :, 0]
     turned = np.vstack([np.zeros(3), np.cumsum(speed[1:] * np.diff(t)[:, None], axis=0)])
-    th = turned + uniform_filter1d(th - turned, _SMOOTHED, axis=0, mode="nearest")  # as driven, without noise
+    th = turned + _smoothed(th - turned, _SMOOTHED)  # as driven, without noise
     top = max(float(np.abs(speed).max()), 1e-300)
     sense = np.where(np.abs(speed) > 0.05 * top, np.sign(speed), 0.0)
     load = np.concatenate([(x / max(float(np.abs(x).max()), 1e-300)).T for x in (w, f, speed)])
     shares = [min(float(np.median(np.diff(t))) / lag, 0.5) for lag in _LAGS]
-    lagging, warm = (
-        lfilter([share], [1.0, share - 1.0], x, axis=1)
-        for share, x in zip(shares, (load, load**2), strict=True)
-    )
+    lagging, warm = (_lagging(x, share) for share, x in zip(shares, (load, load**2), strict=True))
     return RowSignals(load, np.diff(load, prepend=load[:, :1]), lagging - load, warm, th, sense)
+
+
+def _smoothed(x: Array, n: int) -> Array:
+    """Means (m, k) of n rows about each row of x (m, k), the ends repeated."""
+    sums = np.cumsum(np.pad(x, [(n // 2 + 1, n - 1 - n // 2), (0, 0)], mode="edge"), axis=0)
+    return np.asarray((sums[n:] - sums[:-n]) / n)
+
+
+def _lagging(x: Array, share: float) -> Array:
+    """Exponentially weighted means (k, m) of x (k, m), of which each row takes a ``share`` anew."""
+    from scipy.linalg import solve_banded
+
+    n = x.shape[1]
+    band = np.stack([np.ones(n), np.full(n, share - 1.0)])
+    return np.asarray(solve_banded((1, 0), band, share * x.T).T)
 
 
 def _courses(of: RowSignals, channel: int, joints: tuple[int, ...]) -> Iterator[tuple[str, str, list[Array]]]:
