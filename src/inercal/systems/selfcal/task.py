@@ -91,11 +91,11 @@ def calibrate(
     settings, left_out = told_apart(settings, still_joints(settings, recording.th), recording.th[0])
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
-    filtered = filtering.estimate(recording, of, courses=courses)
+    row_by_row = filtered = filtering.estimate(recording, of, courses=courses)
     progress("looking for faults")
     passed = pass_of(recording, of, filtered)
     if passed is not None and filtered.kind == "error-state":
-        filtered = passed.final  # judged, and shown, at its values
+        filtered = passed.final  # judged at its values
     bounds = _lost_bounds(recording, of, filtered) if passed is None else bounds_of(passed)
     faults = [
         *diagnose(recording, of, filtered, stated_errors(settings), passed),
@@ -128,7 +128,7 @@ def calibrate(
     truth = None if settings.true_values is None else settings.true_values[of.states.index]
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
-    return Calibration(timed, of, recording, filtered, bounds, settings, compared, stated, truth)
+    return Calibration(timed, of, recording, row_by_row, bounds, settings, compared, stated, truth)
 
 
 def _lost_bounds(recording: Recording, of: FilterProblem, filtered: FilterResult) -> PathBounds:

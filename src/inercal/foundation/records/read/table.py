@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -93,6 +95,11 @@ class FirstLook:
     units: tuple[str | None, ...] = ()
     numbered: bool = False
     texts: Mapping[int, tuple[str, ...]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def times_named(self) -> Counter[str]:
+        """How often each name stands in the header; empty where none is a name."""
+        return Counter(self.names) if any(self.names) else Counter()
 
 
 class Reader(Protocol):

@@ -246,12 +246,9 @@ def _placed(sample: FirstLook, stamps: TimeForm | None) -> TimeForm | None:
 
 def origin_of(sample: FirstLook, index: int) -> Origin:
     """The name of a column in a map."""
-    if any(sample.names):
-        return (
-            sample.names[index]
-            if not sample.numbered and sample.names.count(sample.names[index]) == 1
-            else index
-        )
+    if sample.times_named:
+        alone = not sample.numbered and sample.times_named[sample.names[index]] == 1
+        return sample.names[index] if alone else index
     return (sample.variable, index) if sample.variable else index
 
 
