@@ -136,12 +136,14 @@ class Columns:
                 for unit in choices(str(entry.get("unit", ""))):
                     button(unit, partial(self.answer, paths, unit))
 
-    async def answer(self, paths: Sequence[str], unit: str, recognised: bool = True) -> None:
-        """The channels of a sensor have the unit that was chosen; those ``recognised`` are certain then."""
+    async def answer(self, paths: Sequence[str], unit: str, grade: str = "guess") -> None:
+        """The channels of a sensor have the unit that was chosen; those that were recognised, with a ``grade``, are
+        certain then, and a question is gone. The table is not drawn anew without one: somebody may be typing in it."""
         said = {"unit": toml(unit)}
-        said |= {"grade": '"certain"', "because": '"as answered"', "question": ""} if recognised else {}
+        said |= {"grade": '"certain"', "because": '"as answered"', "question": ""} if grade else {}
         await self.write({f"{path}.{key}": value for path in paths for key, value in said.items()})
-        self.fill()
+        if grade == "guess":
+            self.fill()
 
     def row(self, part: FileColumns, name: str, entry: Mapping[str, Any]) -> list[Any]:
         """A channel of the map."""
@@ -164,7 +166,7 @@ class Columns:
         def unit() -> None:
             field = ui.input(value=str(entry.get("unit", ""))).props(f'dense aria-label="unit of {name}"')
             field.classes("w-28")
-            field.on("change", lambda: self.answer([path], field.value, bool(entry.get("grade"))))
+            field.on("change", lambda: self.answer([path], field.value, entry.get("grade", "")))
 
         def sign() -> None:
             ui.select(
