@@ -137,11 +137,10 @@ class Columns:
                     button(unit, partial(self.answer, paths, unit))
 
     async def answer(self, paths: Sequence[str], unit: str, grade: str = "guess") -> None:
-        """The channels of a sensor have the unit that was chosen; those that were recognised, with a ``grade``, are
-        certain then, and a question is gone. The table is not drawn anew without one: somebody may be typing in it."""
-        said = {"unit": toml(unit)}
-        said |= {"grade": '"certain"', "because": '"as answered"', "question": ""} if grade else {}
-        await self.write({f"{path}.{key}": value for path in paths for key, value in said.items()})
+        """Channels have the unit that was chosen, certain with a ``grade``; drawn anew for a guess, lest one types."""
+        known = {"grade": '"certain"', "because": '"as answered"', "question": ""} if grade else {}
+        said = known | {"unit": toml(unit)}
+        await self.write({f"{path}.{key}": said[key] for path in paths for key in said})
         if grade == "guess":
             self.fill()
 
@@ -164,9 +163,10 @@ class Columns:
             ).classes("w-40")
 
         def unit() -> None:
-            field = ui.input(value=str(entry.get("unit", ""))).props(f'dense aria-label="unit of {name}"')
-            field.classes("w-28")
-            field.on("change", lambda: self.answer([path], field.value, entry.get("grade", "")))
+            field = ui.input(value=entry.get("unit", "")).props(f'dense aria-label="unit of {name}"')
+            field.classes("w-28").on(
+                "change", lambda: self.answer([path], field.value, entry.get("grade", ""))
+            )
 
         def sign() -> None:
             ui.select(

@@ -98,7 +98,7 @@ class FirstLook:
 
     @cached_property
     def times_named(self) -> Counter[str]:
-        """How often each name stands in the header; empty where none is a name."""
+        """Counts of the names in the header; empty where none is a name."""
         return Counter(self.names) if any(self.names) else Counter()
 
 
