@@ -150,10 +150,9 @@ class Columns:
         taken = toml(entry.get("from"))
 
         async def column(chosen: str) -> None:
-            if chosen != _NONE:
-                return await self.change(f"{path}.from", chosen, "value")
-            await self.write({path: ""})
-            return self.fill()
+            kept = chosen != _NONE
+            await (self.change(f"{path}.from", chosen, "value") if kept else self.write({path: ""}))
+            self.fill()
 
         def origin() -> None:
             columns = [_NONE, *dict.fromkeys([taken, *part.there])]
@@ -163,10 +162,9 @@ class Columns:
             ).classes("w-40")
 
         def unit() -> None:
-            field = ui.input(value=entry.get("unit", "")).props(f'dense aria-label="unit of {name}"')
-            field.classes("w-28").on(
-                "change", lambda: self.answer([path], field.value, entry.get("grade", ""))
-            )
+            grade, aria = entry.get("grade", ""), f'dense aria-label="unit of {name}"'
+            field = ui.input(value=entry.get("unit", "")).props(aria).classes("w-28")
+            field.on("change", lambda: self.answer([path], field.value, grade))
 
         def sign() -> None:
             ui.select(
