@@ -404,3 +404,14 @@ def test_turns_about_the_vertical_alone_give_no_scale_of_counts():
     up = verticals_of(alone)
     assert len(not_seen(same, sections, replace(PRIORS, gyro_scale=None), up)) == len(moves)
     assert not_seen(same, sections, PRIORS, up) == ()
+
+
+@pytest.mark.parametrize("factor", [np.pi / 180.0, 180.0 / np.pi])
+def test_a_wrong_unit_is_named_and_no_rows_are_missed(factor):
+    """Outputs in rad/s that are said to be in deg/s are small in every move, and the other way round."""
+    record = turned_by_hand(np.random.default_rng(3), 12)
+    sections = [replace(s, gyro=factor * s.gyro) for s in record.sections()]
+    moves = [replace(move, gyro=factor * move.gyro) for move in record.moves()]
+    found = calibrate_with_moves(sections, moves, PRIORS)
+    assert found.left_out == ()
+    assert found.rescaled

@@ -16,7 +16,7 @@ from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import EVERYTHING, Finding, Status, settled
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.places import counted_names
-from inercal.foundation.records.record import Record
+from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import studied
 from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.imu.ferraris.closed_form import imucal_coefficients
@@ -108,7 +108,10 @@ def calibrate_ferraris(
     if questions:
         found = CalibrationFromSections(_contradicted(record, questions, notes, settings), sections)
     else:
-        found = of_proposal(proposal, [record], settings, backward=sense.backward, progress=progress)
+        temperature = recorded_temperature(record)
+        found = of_proposal(
+            proposal, [record], settings, backward=sense.backward, temperature=temperature, progress=progress
+        )
     result = {**found.estimate.result, "found_by": nine.found_by}
     with suppress(LinAlgError, FloatingPointError), np.errstate(divide="raise", invalid="raise"):
         told = {name: tuple(parts) for name, parts in stretches.items()}

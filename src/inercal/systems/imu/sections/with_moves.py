@@ -118,14 +118,14 @@ def not_seen(
     cosine = [np.clip(up[move.first] @ up[move.last], -1.0, 1.0) for move in moves]
     angle = np.arccos(cosine)
     told = any(s.kind != "rest" and s.gyro is not None for s in sections)
-    size = priors.gyro_scale
-    least = float(np.max(swept)) / LIMITS.largest_sweep if size is None else (1.0 - size.spread) * size.median
+    # by the largest sweep, not by the stated unit: a wrong unit makes all of them small, and is named as such
+    least = float(np.max(swept)) / LIMITS.largest_sweep
     missing = (angle > LIMITS.turned_vertical) & (swept < 0.5 * least * angle)
     out = [
         MoveLeftOut(int(k), "the vertical turns and the gyro does not: rows are missing")
         for k in np.flatnonzero(missing)
     ]
-    if size is None and not told and not np.any((angle > LIMITS.turned_vertical) & ~missing):
+    if priors.gyro_scale is None and not told and not np.any((angle > LIMITS.turned_vertical) & ~missing):
         open_still = "it turns about the vertical, which leaves the scale of a gyro in counts open"
         out += [MoveLeftOut(int(k), open_still) for k in np.flatnonzero(~missing)]
     return tuple(out)
