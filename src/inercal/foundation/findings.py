@@ -60,6 +60,7 @@ CODES: dict[str, Code] = {
     "restless_start": Code("the instrument is not at rest at the start, or restless there", _NEVER),
     "outlier": Code("single samples far from their neighbours", _BY_SIZE, rank=16),
     "contradiction": Code("sensors contradict each other", _BY_SIZE, rank=14),
+    "axis_missing": Code("a channel of a triad is not there", _NEVER),
     "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),
     "gyro_restless": Code("the gyro is too restless in the holds to help in finding them", _NEVER),
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),

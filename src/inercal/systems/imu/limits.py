@@ -300,6 +300,14 @@ class Limits:
     judged_rows: int = 1000
     """Rows of each sensor that are judged at most: those of longer records are summed."""
 
+    left_at_prior: float = 0.5
+    """u of a value over that of its prior below which the turns about one axis tell it; of a bias the largest share of
+    its variance by priors of gains."""
+
+    usual_gain_u: float = 0.05
+    """Standard uncertainty of a scale factor over its unit, and of a misalignment [rad], where one axis leaves it
+    open."""
+
     # aided by a table: its diagnosis; shares of an output are of its variation over the test
 
     misfit_risk: float = 2.5e-5

@@ -14,6 +14,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.geometry.rotations import skew
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.column import Triad
+from inercal.foundation.records.record import Record
 from inercal.systems.imu.aided.table import TableMotion, forward
 from inercal.systems.imu.limits import LIMITS
 
@@ -26,7 +27,8 @@ class Blocks:
     """Means ``y`` (n, 3) [output] of a triad over blocks.
 
     ``samples`` (n, s) [s] are the times of the samples, ``nodes`` (n, s + 1) [s] the ends of their intervals,
-    ``resting`` (n,) whether the table rests throughout, ``clipped`` how many blocks each axis that saturates has lost.
+    ``resting`` (n,) whether the table rests throughout, ``clipped`` how many blocks each axis that saturates has lost,
+    ``axes`` the numbers of the channels that are there; ``y`` of the others is 0.
     """
 
     triad: Triad
@@ -35,6 +37,7 @@ class Blocks:
     nodes: Array
     resting: NDArray[np.bool_]
     clipped: Mapping[str, int]
+    axes: tuple[int, ...] = (0, 1, 2)
 
     @property
     def middle(self) -> Array:
@@ -57,6 +60,33 @@ class Blocks:
         )
 
 
+def triad_of(record: Record, sensor: str) -> Triad | None:
+    """The channels of a sensor, at the middles of their samples: NaN (n,) for one that is not there; None without any.
+
+    What was gained since the row before is the rate half a sample earlier. Raises `RecordError` where units or clocks
+    differ.
+    """
+    there = {axis: record[f"{sensor}_{axis}"] for axis in "xyz" if f"{sensor}_{axis}" in record}
+    if not there:
+        return None
+    first = next(iter(there.values()))
+    if len(there) == 3:
+        triad = record.triad(sensor)
+    else:
+        for column in there.values():
+            if column.t is not first.t or column.unit != first.unit:
+                raise RecordError(
+                    column.source.path,
+                    f"{column.name} in {column.unit.symbol} has another unit or clock than {first.name} in "
+                    f"{first.unit.symbol}, expected one for the sensor",
+                )
+        none = np.full(len(first.t), np.nan)
+        values = [there[axis].values if axis in there else none for axis in "xyz"]
+        triad = Triad(sensor, first.unit, first.t, np.stack(values, axis=-1), first.source)
+    half = 0.5 / triad.rate if first.increment and np.isfinite(triad.rate) else 0.0
+    return replace(triad, t=triad.t - half) if half else triad
+
+
 def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
     """Cut a triad into blocks of equally many samples, without those that lack samples or saturate.
 
@@ -76,10 +106,12 @@ def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
     n = len(t) // s
     steps = np.clip(np.diff(t), 0.0, 1.5 * interval)
     low, high = t - 0.5 * np.r_[interval, steps], t + 0.5 * np.r_[steps, interval]
-    good = np.asarray(np.isfinite(triad.values).all(axis=1))
+    axes = tuple(k for k in range(3) if np.isfinite(triad.values[:, k]).any())
+    good = np.asarray(np.isfinite(triad.values[:, axes]).all(axis=1))
+    outputs = np.where(np.isin(range(3), axes), triad.values, 0.0)
     at_end = {}
-    for axis, values in zip("xyz", triad.values.T, strict=True):
-        at_end[axis] = at_ends(values)
+    for k in axes:
+        at_end["xyz"[k]] = at_ends(triad.values[:, k])
     whole = np.r_[True, (np.diff(t) > 0.5 * interval) & (np.diff(t) < 1.5 * interval)]
 
     def rows(x: NDArray[Any]) -> NDArray[Any]:
@@ -100,8 +132,8 @@ def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
     nodes = nodes[kept]
     weights = np.diff(nodes, axis=1)
     weights /= weights.sum(axis=1, keepdims=True)
-    y = np.einsum("ns,nsi->ni", weights, rows(triad.values)[kept])
-    return Blocks(triad, y, rows(t)[kept], nodes, _within(nodes, rests), clipped)
+    y = np.einsum("ns,nsi->ni", weights, rows(outputs)[kept])
+    return Blocks(triad, y, rows(t)[kept], nodes, _within(nodes, rests), clipped, axes)
 
 
 def _within(nodes: Array, rests: Array) -> NDArray[np.bool_]:

@@ -7,24 +7,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding, Status, settled
 from inercal.foundation.inference.plausible import implausible
 from inercal.foundation.instruments.terms import TERMS
-from inercal.foundation.records.column import Triad
-from inercal.foundation.records.places import counted
+from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeB, combine
 from inercal.foundation.results.result import Estimate, timed
 from inercal.foundation.units import RAW
-from inercal.systems.imu.aided.blocks import Blocks, cut
+from inercal.systems.imu.aided.blocks import Blocks, cut, triad_of
 from inercal.systems.imu.aided.coefficients import (
     circumstances_of,
     coefficients,
@@ -32,15 +32,16 @@ from inercal.systems.imu.aided.coefficients import (
     names_of,
     of_triad,
     standard_uncertainty,
+    told,
     type_a,
     type_b,
 )
 from inercal.systems.imu.aided.diagnosis.examination import misfits
 from inercal.systems.imu.aided.diagnosis.fit_quality import knocks
-from inercal.systems.imu.aided.diagnosis.gross import agreement, cures, expected, lag, tells, travel
+from inercal.systems.imu.aided.diagnosis.gross import cures, expected, lag, match, tells, travel
 from inercal.systems.imu.aided.fit import AidedFit, fit
 from inercal.systems.imu.aided.judged import judged_table
-from inercal.systems.imu.aided.model import side_of, unknowns
+from inercal.systems.imu.aided.model import one_axis, side_of, unknowns
 from inercal.systems.imu.aided.table import TableMotion, motion_of, shifted, times, values_of
 from inercal.systems.imu.aided.verdict import findings, scatter, verdict
 from inercal.systems.imu.aided.walk import whiten
@@ -75,12 +76,21 @@ def assemble(
     lag: float,
     settings: ImuSettings,
     earlier: list[Finding],
+    by_one_axis: bool = False,
 ) -> Estimate:
-    """Put the estimate together."""
+    """Put the estimate together; of a table of one axis, ``by_one_axis``, only of values that it tells."""
     triads = tuple(fit.identified)
-    of_imu = names_of(triads, settings.g_sensitivity, settings.k2)
-    names = (*of_imu, *circumstances_of(triads))
+    names = (*names_of(fit, settings.g_sensitivity, settings.k2), *circumstances_of(fit))
     values, rows, own = coefficients(fit, names, lag)
+    if by_one_axis:
+        known = told(fit, rows, own)
+        earlier = [
+            *earlier,
+            *_at_prior([name for name, is_told in zip(names, known, strict=True) if not is_told]),
+        ]
+        names = tuple(name for name, is_told in zip(names, known, strict=True) if is_told)
+        values, rows, own = values[known], rows[known], own[known]
+    of_imu = tuple(name for name in names if not name.startswith(("r_", "tau_")))
     sources_a = type_a(fit, rows, own, names)
     sources_b = type_b(fit, rows, names, values, settings.site, settings.time_base_u)
     faulty = misfits(fit, names, rows, motion, settings.site.gravity)
@@ -98,7 +108,7 @@ def assemble(
     ]
     symbols = {triad: of_triad(fit, triad)[0].side.blocks.triad.unit.symbol for triad in triads}
     units = [
-        TERMS[name].unit_for(symbols["gyro" if name.startswith(("D_", "S_", "T_", "G_")) else "acc"])
+        TERMS[name].unit_for(symbols.get("gyro" if name.startswith(("D_", "S_", "T_", "G_")) else "acc", ""))
         for name in names
     ]
     geometry = tuple(name for name in names if name.startswith(("r_", "tau_")))
@@ -122,7 +132,7 @@ def assemble(
             "method": "aided",
             "rests": rest_table(fit, motion, rests),
             "time_shift_s": {triad: _with_u(fit, f"time shift of {triad}", lag) for triad in triads},
-            "lever_arm_m": _with_u(fit, "lever arm"),
+            "lever_arm_m": _with_u(fit, "lever arm") if "acc" in triads else {},
             "noise": {triad: _noise(fit, triad) for triad in triads},
             "unit": symbols,
         },
@@ -142,7 +152,7 @@ def _of_values(
             }
     angles = [name for name in names if name.startswith(("M_", "T_"))]
     by_name = dict(zip(names, values.tolist(), strict=True))
-    full = {f"K0_{axis}": gravity * by_name[f"K1_{axis}"] for axis in "xyz"}
+    full = {f"K0_{axis}": gravity * by_name[f"K1_{axis}"] for axis in "xyz" if f"K1_{axis}" in by_name}
     return implausible(names, values, u, about, angles, full)
 
 
@@ -174,7 +184,9 @@ def _statistics(fit: AidedFit, rests: Array) -> dict[str, float]:
             sensors = of_triad(fit, triad)
             squares = [np.mean(sensor.residual**2) for sensor in sensors]
             statistics |= {
-                f"{prefix}dof": float(3 * (len(sensors[0].residual) - 1) - len(fit.identified[triad].names)),
+                f"{prefix}dof": float(
+                    len(sensors) * (len(sensors[0].residual) - 1) - len(fit.identified[triad].names)
+                ),
                 f"{prefix}condition": fit.identified[triad].condition,
                 f"{prefix}residual_rms": float(np.sqrt(np.mean(squares))),
             }
@@ -217,7 +229,7 @@ def rest_table(fit: AidedFit, motion: TableMotion, rests: Array) -> list[Mapping
 def _conditions(record: Record, fit: AidedFit, settings: ImuSettings) -> dict[str, Any]:
     """Conditions and ranges over which the result is valid, as recorded."""
     g = settings.site.gravity
-    blocks = of_triad(fit, "acc")[0].side.blocks
+    blocks = fit.sensors[0].side.blocks
     ranges: dict[str, Any] = {
         "specific_force_along_an_axis_m_s2": [-g, g],
         "duration_s": float(blocks.nodes[-1, -1] - blocks.nodes[0, 0]),
@@ -275,16 +287,12 @@ def calibrate_aided(
     progress("comparing the sensors with the table's angles")
     motion = motion_of(record, options.chain)
     rests = motion.rests()
-    triads = [_centred(record, "acc")]
-    findings = []
-    if any(f"gyro_{axis}" in record for axis in "xyz"):
-        triads.append(_centred(record, "gyro"))
-    else:
-        findings.append(
-            Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
-        )
+    triads = [triad for sensor in ("acc", "gyro") if (triad := triad_of(record, sensor)) is not None]
+    if not triads:
+        raise RecordError(motion.path, "found neither accelerometers nor gyros, expected one of the two")
+    findings = list(_missing(record))
     blocks = [cut(triad, motion, rests) for triad in triads]
-    late = lag(blocks[1], motion) if len(blocks) > 1 else 0.0
+    late = lag(blocks[-1], motion) if triads[-1].sensor == "gyro" else 0.0
     if late != 0.0:
         motion, rests = shifted(motion, -late), rests - late
         blocks = [cut(triad, motion, rests) for triad in triads]
@@ -293,11 +301,11 @@ def calibrate_aided(
     for each in blocks:
         sensor, x = each.triad.sensor, expected(each, motion)
         scales[sensor] = 1.0 / each.triad.unit.factor
-        if tells(sensor, x):
-            match = agreement(each.y, x)
-            if match.miss > LIMITS.agreement_miss:
-                wrong.append(f"{sensor} leaves {100.0 * match.miss:.0f} %")
-            scales[sensor] = match.scale / (settings.site.gravity if sensor == "acc" else 1.0)
+        if tells(sensor, x[:, each.axes]):
+            found = match(each, x)
+            if found.miss > LIMITS.agreement_miss:
+                wrong.append(f"{sensor} leaves {100.0 * found.miss:.0f} %")
+            scales[sensor] = found.scale / (settings.site.gravity if sensor == "acc" else 1.0)
     bad = None
     if travel(motion) < LIMITS.table_travel:
         said_of_it = (
@@ -312,7 +320,13 @@ def calibrate_aided(
         return AidedCalibration(timed(estimate, clock), motion, rests)
     progress("fitting all sensors")
     layout = unknowns(
-        settings.site, options, scales, values_of(motion, rests), settings.g_sensitivity, settings.k2
+        settings.site,
+        options,
+        scales,
+        values_of(motion, rests),
+        settings.g_sensitivity and "gyro" in scales,
+        settings.k2 and "acc" in scales,
+        frozenset(each.triad.sensor for each in blocks if each.triad.unit.dimension in RAW),
     )
     names = {
         each.triad.sensor: gain_names(each.triad.sensor, settings.g_sensitivity, settings.k2)
@@ -331,15 +345,35 @@ def calibrate_aided(
         ]
         blocks = [each.only(~knocked[each.triad.sensor]) for each in blocks]
         done = fitted()
-    estimate = assemble(record, motion, rests, done, late, settings, findings)
+    estimate = assemble(record, motion, rests, done, late, settings, findings, one_axis(options.chain))
     return AidedCalibration(timed(estimate, clock), motion, rests, done)
 
 
-def _centred(record: Record, sensor: str) -> Triad:
-    """A triad at the middles of its samples: what was gained since the row before is the rate half a sample earlier."""
-    triad = record.triad(sensor)
-    half = 0.5 / triad.rate if record[f"{sensor}_x"].increment and np.isfinite(triad.rate) else 0.0
-    return replace(triad, t=triad.t - half) if half else triad
+def _missing(record: Record) -> Iterator[Finding]:
+    """Channels of a triad that are not there."""
+    there = {sensor: [axis for axis in "xyz" if f"{sensor}_{axis}" in record] for sensor in ("acc", "gyro")}
+    if not there["gyro"]:
+        yield Finding("gyro_missing", "the record has no gyro: only the accelerometers are calibrated")
+    lost = [f"{sensor}_{axis}" for sensor, own in there.items() if own for axis in "xyz" if axis not in own]
+    if lost:
+        yield Finding(
+            "axis_missing",
+            f"The record has no {counted_names(lost)}: only the others are calibrated.",
+            action="If it should have, name its column in a map.",
+            harm=(),
+        )
+
+
+def _at_prior(names: Sequence[str]) -> Iterator[Finding]:
+    """Values of which turns about one axis say nothing."""
+    coefficients = [name for name in names if not name.startswith(("r_", "tau_"))]
+    if coefficients:
+        yield Finding(
+            "by_prior",
+            f"One axis tells next to nothing of {counted_names(coefficients)}: they are left out.",
+            action="Set the instrument up with another of its axes along that of the table, and calibrate that too.",
+            harm=(),
+        )
 
 
 def _contradiction(wrong: list[str], blocks: list[Blocks], motion: TableMotion) -> str:

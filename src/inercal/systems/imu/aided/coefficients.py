@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import Site
@@ -30,15 +31,43 @@ def gain_names(triad: str, g_sensitivity: bool = False, squares: bool = False) -
     return (*rows, *(GYRO_G_SENSITIVITY if g_sensitivity else ()))
 
 
-def names_of(triads: tuple[str, ...], g_sensitivity: bool, squares: bool = False) -> tuple[str, ...]:
-    """Names of all coefficients in the order of results."""
-    gyro = (*GYRO_TRIAD, *(GYRO_G_SENSITIVITY if g_sensitivity else ())) if "gyro" in triads else ()
-    return (*ACCELEROMETERS_IN_A_FRAME, *(SQUARES if squares else ()), *gyro)
+def names_of(fit: AidedFit, g_sensitivity: bool, squares: bool = False) -> tuple[str, ...]:
+    """Names of the coefficients of the sensors in a fit, in the order of results."""
+    whole = (*ACCELEROMETERS_IN_A_FRAME, *(SQUARES if squares else ()))
+    whole = (*whole, *GYRO_TRIAD, *(GYRO_G_SENSITIVITY if g_sensitivity else ()))
+    there = {sensor.name for sensor in fit.sensors}
+    return tuple(name for name in whole if _sensor_of(name) in there)
 
 
-def circumstances_of(triads: tuple[str, ...]) -> tuple[str, ...]:
+def circumstances_of(fit: AidedFit) -> tuple[str, ...]:
     """Names of what belongs to the test: lever arms, and delays of the sensors against the table's angles."""
-    return (*LEVER_ARMS, *(_DELAYS[triad] for triad in triads))
+    there = {sensor.name for sensor in fit.sensors}
+    arms = (name for name in LEVER_ARMS if _sensor_of(name) in there)
+    return (*arms, *(_DELAYS[triad] for triad in fit.identified))
+
+
+def _sensor_of(name: str) -> str:
+    """The channel that a coefficient is of: ``acc_x`` of ``M_xy``."""
+    letter, axes = name.rsplit("_", 1)
+    return f"{'gyro' if letter in ('D_F', 'S', 'T', 'G') else 'acc'}_{axes[0]}"
+
+
+def told(fit: AidedFit, rows: Array, own: Array) -> NDArray[np.bool_]:
+    """True (p,) for values of which the data say more than what was known of gains, arms and delays before.
+
+    ``rows`` (p, P) and ``own`` (p,) as from `coefficients`. What has a prior itself is told where its u is below a part
+    of that prior's (`LIMITS.left_at_prior`); a bias has none, and is told where no such prior makes most of its u.
+    """
+    sd, places = fit.unknowns.sd, fit.unknowns.places
+    named = [at for name, at in places.items() if name.startswith(("gain ", "lever arm", "time shift of "))]
+    index = np.concatenate(named)
+    gain = rows @ fit.covariance
+    variance = np.einsum("pi,pi->p", gain, rows) + own
+    before = np.sum((rows[:, index] * sd[index]) ** 2, axis=1)
+    by_prior = np.sum((gain[:, index] / sd[index]) ** 2, axis=1)
+    left = LIMITS.left_at_prior
+    of_a_prior = (before == 0.0) | (variance < left**2 * before)
+    return np.asarray(np.where(own > 0.0, by_prior <= left * variance, of_a_prior))
 
 
 def coefficients(fit: AidedFit, names: tuple[str, ...], lag: float) -> tuple[Array, Array, Array]:
@@ -48,14 +77,14 @@ def coefficients(fit: AidedFit, names: tuple[str, ...], lag: float) -> tuple[Arr
     """
     P = len(fit.x)
     by_name: dict[str, tuple[float, Array, float]] = {}
-    for k, sensor in enumerate(fit.sensors):
-        triad, i = sensor.side.sensor, "xyz"[k % 3]
+    for sensor in fit.sensors:
+        triad, i = sensor.side.sensor, "xyz"[sensor.axis]
         bias, scale, cross = _LETTERS[triad]
         row = np.zeros(P)
         row[sensor.equation.index] = -sensor.whitened.mean[:-1]
         by_name[f"{bias}_{i}"] = (sensor.bias, row, sensor.whitened.mean_variance)
-        places = fit.unknowns.places[f"gain {triad}"][3 * (k % 3) : 3 * (k % 3) + 3]
-        own = places[k % 3]
+        places = fit.unknowns.places[f"gain {triad}"][3 * sensor.axis : 3 * sensor.axis + 3]
+        own = places[sensor.axis]
         S = fit.x[own]
         for j, place in zip("xyz", places, strict=True):
             row = np.zeros(P)
@@ -67,12 +96,13 @@ def coefficients(fit: AidedFit, names: tuple[str, ...], lag: float) -> tuple[Arr
             by_name[f"{scale}_{i}" if place == own else f"{cross}_{i}{j}"] = (float(value), row, 0.0)
     for name, place in zip(GYRO_G_SENSITIVITY, fit.unknowns.places.get("gain G", ()), strict=False):
         by_name[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
-    gains = fit.unknowns.places["gain acc"][[0, 4, 8]]
-    for name, place, own in zip(SQUARES, fit.unknowns.places.get("gain K2", ()), gains, strict=False):
+    squares = fit.unknowns.places.get("gain K2", ())
+    gains = fit.unknowns.places["gain acc"][[0, 4, 8]] if len(squares) else ()
+    for name, place, own in zip(SQUARES, squares, gains, strict=False):
         row = np.zeros(P)
         row[place], row[own] = 1.0 / fit.x[own], -fit.x[place] / fit.x[own] ** 2
         by_name[name] = (float(fit.x[place] / fit.x[own]), row, 0.0)
-    for name, place in zip(LEVER_ARMS, fit.unknowns.places["lever arm"], strict=True):
+    for name, place in zip(LEVER_ARMS, fit.unknowns.places.get("lever arm", ()), strict=False):
         by_name[name] = (float(fit.x[place]), np.eye(P)[place], 0.0)
     for triad in fit.identified:
         # angles that come late are sensors that are early
@@ -164,7 +194,7 @@ def standard_uncertainty(fit: AidedFit, group: str) -> Array:
 
 
 def of_triad(fit: AidedFit, triad: str) -> list[Sensor]:
-    """The three sensors of a triad."""
+    """The sensors of a triad."""
     return [sensor for sensor in fit.sensors if sensor.side.sensor == triad]
 
 

@@ -61,7 +61,7 @@ def _biases(fit: AidedFit, rests: Array, triad: str) -> Picture:
     length = np.array([blocks.length[inside].sum() for inside in blocks_of])
     resting = np.array([blocks.resting[inside].mean() > 0.5 for inside in blocks_of])
     panels = []
-    for axis, sensor in zip("xyz", sensors, strict=True):
+    for sensor in sensors:
         means = np.array(
             [np.average(sensor.residual[inside], weights=blocks.length[inside]) for inside in blocks_of]
         )
@@ -70,13 +70,13 @@ def _biases(fit: AidedFit, rests: Array, triad: str) -> Picture:
         for chosen, colour in ((numbers % 2 == 0, COLOURS[0]), (numbers % 2 == 1, COLOURS[1])):
             marks.append(Dots(middle[chosen], means[chosen], colour=colour, up=noise[chosen]))
         unit = f"\n[{plain_unit(blocks.triad.unit.symbol)}]"
-        across = Axis("time [s]" if axis == "z" else "", margin=0.005)
-        panels.append([Panel(marks, across, Axis(f"{triad}_{axis}{unit}"))])
+        across = Axis("time [s]" if sensor is sensors[-1] else "", margin=0.005)
+        panels.append([Panel(marks, across, Axis(f"{sensor.name}{unit}"))])
     return draw(
         f"Residuals of the {_WORDS[triad]}",
         "Output less what the calibration and the table make of it, averaged over each rest (blue) and each turn "
         "(orange). Bars: ± one standard uncertainty by white noise alone. What they do not explain is the wander of "
         "the bias, about its mean over the test; a pattern that goes with the position is something else.",
         panels,
-        4.2,
+        1.4 * len(sensors),
     )

@@ -186,6 +186,16 @@ class Sensor:
     whitened: WhitenedColumns
 
     @property
+    def axis(self) -> int:
+        """Its number in the triad."""
+        return self.equation.axis
+
+    @property
+    def name(self) -> str:
+        """As the record calls it: ``acc_x``."""
+        return f"{self.side.sensor}_{'xyz'[self.axis]}"
+
+    @property
     def bias(self) -> float:
         """Mean of its bias over the test [output]."""
         return float(self.whitened.mean[-1])
@@ -198,7 +208,7 @@ class Sensor:
 
 @dataclass(frozen=True, eq=False)
 class AidedFit:
-    """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, three of each triad.
+    """Unknowns ``x`` (P,), their ``covariance`` (P, P), and the sensors behind it, those of a triad together.
 
     ``references`` by triad; ``identified`` by triad the identifiability of its gains on a perfect table.
     """
@@ -246,9 +256,9 @@ def fit(
             ]
             noise = noise or [
                 level
-                for first in range(0, len(pairs), 3)
+                for triad in sides
                 for level in chosen(
-                    [noise_of(side, each, layout, x, rough) for side, each in pairs[first : first + 3]]
+                    [noise_of(side, each, layout, x, rough) for side, each in pairs if side is triad]
                 )
             ]
             sensors = [
@@ -323,9 +333,15 @@ def _identified(
     Errors of the table do not count: a large one, such as that of the mounting, which turns the frame of all sensors,
     makes the uncertainties large, but no motion would help.
     """
-    main = np.concatenate([layout.places[f"gain {each}"] for each in _gains(triad, layout)])
+    axes = sorted({sensor.axis for sensor in sensors if sensor.side.sensor == triad})
+    groups = [layout.places[f"gain {each}"].reshape(3, -1) for each in _gains(triad, layout)]
+    main = np.concatenate([group[axes].ravel() for group in groups])
+    numbers = np.split(np.arange(len(names[triad])), np.cumsum([group.size for group in groups])[:-1])
+    kept = [number.reshape(3, -1)[axes].ravel() for number in numbers]
+    own_names = tuple(names[triad][k] for k in np.concatenate(kept))
     of_table = [layout.places[name] for name in layout.stated if name != "earth rate"]
-    others = np.setdiff1d(np.arange(len(layout.sd)), np.concatenate([main, *of_table]))
+    whole = np.concatenate([group.ravel() for group in groups])
+    others = np.setdiff1d(np.arange(len(layout.sd)), np.concatenate([whole, *of_table]))
     rows = [np.zeros((len(others), len(layout.sd)))]
     rows[0][range(len(others)), others] = 1.0
     for sensor in sensors:
@@ -337,7 +353,7 @@ def _identified(
         rows.append(_triangle(wide))
     R = _triangle(np.vstack(rows)[:, np.r_[others, main]])
     own = R[len(others) :, len(others) :]
-    return identify(own, names[triad], np.ones(len(main)))
+    return identify(own, own_names, np.ones(len(main)))
 
 
 def _gains(triad: str, layout: Unknowns) -> tuple[str, ...]:

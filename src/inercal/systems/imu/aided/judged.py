@@ -61,7 +61,7 @@ def _case(
     variance = [
         sensor.noise.white(sensor.side.blocks.length, sensor.side.blocks.resting) for sensor in fit.sensors
     ]
-    y = [sensor.side.blocks.y[:, k % 3] for k, sensor in enumerate(fit.sensors)]
+    y = [sensor.side.blocks.y[:, sensor.axis] for sensor in fit.sensors]
     return JudgedFit(
         names,
         values,
@@ -75,7 +75,7 @@ def _case(
         np.concatenate([np.arange(count) for count in counts]),
         channel,
         np.concatenate([sensor.side.blocks.middle for sensor in fit.sensors]),
-        tuple(f"{sensor.side.sensor}_{'xyz'[k % 3]}" for k, sensor in enumerate(fit.sensors)),
+        tuple(sensor.name for sensor in fit.sensors),
         tuple(_joints(fit, motion, gravity)),
         0.0,
     )
@@ -85,8 +85,8 @@ def _by_value(fit: AidedFit, names: tuple[str, ...]) -> Array:
     """Change (n, p) of the outputs by the biases, scale factors and misalignments among the values."""
     made = np.zeros((sum(len(sensor.residual) for sensor in fit.sensors), len(names)))
     begin = 0
-    for k, sensor in enumerate(fit.sensors):
-        rows, i = slice(begin, begin + len(sensor.residual)), k % 3
+    for sensor in fit.sensors:
+        rows, i = slice(begin, begin + len(sensor.residual)), sensor.axis
         begin = rows.stop
         bias, scale, cross = _LETTERS[sensor.side.sensor]
         B = gain(fit, sensor.side.sensor)[i]
@@ -142,7 +142,7 @@ def _evidence(
         wide = np.zeros((len(short), P + m + whole.shape[1] + 1))
         wide[:, [*index, *range(P, P + m), *(P + m + there), -1]] = short
         rows.append(wide)
-        bias = f"{_LETTERS[sensor.side.sensor][0]}_{'xyz'[k % 3]}"
+        bias = f"{_LETTERS[sensor.side.sensor][0]}_{'xyz'[sensor.axis]}"
         if bias in case.names:
             direct[case.names.index(bias), there] = done.mean[len(index) + m : -1]
     A = np.vstack([np.eye(P, P + m), *(part[:, : P + m] for part in rows)])
@@ -159,10 +159,11 @@ def _evidence(
 def _terms(fit: AidedFit, case: JudgedFit) -> Iterator[Question]:
     """Terms that the study leaves out, and another earth rate."""
     force = case.predicted[:, None] * case.per_channel
-    if "gain K2" not in fit.unknowns.places:
+    accelerometers = sum(sensor.side.sensor == "acc" for sensor in fit.sensors)
+    if accelerometers and "gain K2" not in fit.unknowns.places:
         yield Question(
-            "reading", "the accelerometers", True, "curve", "with the square of specific force", force[:, :3] ** 2,
-            "unmodelled_k2", "Set imu.k2 = true to estimate it.",
+            "reading", "the accelerometers", True, "curve", "with the square of specific force",
+            force[:, :accelerometers] ** 2, "unmodelled_k2", "Set imu.k2 = true to estimate it.",
         )  # fmt: skip
     if "gyro" not in fit.identified:
         return
@@ -175,9 +176,9 @@ def _terms(fit: AidedFit, case: JudgedFit) -> Iterator[Question]:
     )  # fmt: skip
     if "gain G" not in fit.unknowns.places:
         up = C_bn[:, :, 2]
-        columns = np.zeros((len(case.time), 9))
-        for k in range(3):
-            columns[np.ix_(case.channel == 3 + k, [3 * k, 3 * k + 1, 3 * k + 2])] = up
+        columns = np.zeros((len(case.time), 3 * (len(fit.sensors) - accelerometers)))
+        for k in range(len(fit.sensors) - accelerometers):
+            columns[np.ix_(case.channel == accelerometers + k, [3 * k, 3 * k + 1, 3 * k + 2])] = up
         yield Question(
             "place", "the gyro output", False, "change", "with specific force", columns,
             "g_sensitivity", "Set imu.g_sensitivity = true to estimate it.",

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
-from inercal.foundation.rigs.chain import Scope
+from inercal.foundation.rigs.chain import Chain, Scope
 from inercal.systems.imu.aided.blocks import BlockMotion, Blocks
 from inercal.systems.imu.aided.table import TableMotion, error_nodes
+from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import AidedSettings
 
 Indices = NDArray[np.int64]
@@ -50,6 +51,11 @@ class Unknowns:
     redrawn: frozenset[str]
 
 
+def one_axis(chain: Chain) -> bool:
+    """True for a table that turns about one axis alone, which leaves coefficients open however it turns."""
+    return len(chain.joints) == 1
+
+
 def unknowns(
     site: Site,
     options: AidedSettings,
@@ -57,6 +63,7 @@ def unknowns(
     values: Mapping[str, Indices],
     g_sensitivity: bool,
     squares: bool,
+    raw: frozenset[str] = frozenset(),
 ) -> Unknowns:
     """Lay out the unknowns.
 
@@ -71,11 +78,18 @@ def unknowns(
         (`inercal.systems.imu.aided.table.values_of`).
     g_sensitivity, squares : bool
         Drift of the gyro by specific force, and K2 of the accelerometers.
+    raw : set
+        Sensors in counts or volts, of which no unit tells a scale factor.
+
+    What one axis leaves open is known as of any instrument: scale factors within 5 % of their unit, misalignments
+    within 50 mrad. Of more axes gains have no prior that says anything.
     """
+    narrow = one_axis(options.chain)
     groups: list[tuple[str, Array, Array, str]] = [
         (f"time shift of {sensor}", np.zeros(1), np.full(1, SHIFT_U), "s") for sensor in scales
     ]
-    groups.append(("lever arm", np.zeros(9), np.full(9, ARM_U), "m"))
+    if "acc" in scales:
+        groups.append(("lever arm", np.zeros(9), np.full(9, ARM_U), "m"))
     if "gyro" in scales:
         groups.append(("earth rate", *_earth(site, options), "rad/s"))
     for error in options.chain.errors:
@@ -84,7 +98,9 @@ def unknowns(
         count = int(values[error.name].max()) + 1
         groups.append((error.name, np.zeros(count), np.full(count, error.distribution.std), "rad"))
     for sensor, scale in scales.items():
-        groups.append((f"gain {sensor}", scale * np.eye(3).ravel(), np.full(9, scale), "1"))
+        sd = np.full((3, 3), LIMITS.usual_gain_u if narrow else 1.0)
+        np.fill_diagonal(sd, 1.0 if sensor in raw else sd[0, 0])
+        groups.append((f"gain {sensor}", scale * np.eye(3).ravel(), scale * sd.ravel(), "1"))
     if squares:
         groups.append(("gain K2", np.zeros(3), np.full(3, scales["acc"] / site.gravity), "1"))
     if g_sensitivity and "gyro" in scales:
@@ -153,15 +169,17 @@ def _turns(motion: TableMotion, t: Array, rests: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """One sensor: ``residual`` (n,) of its blocks, ``columns`` (n, a) their derivatives by the unknowns ``index``."""
+    """One sensor, along ``axis`` of its triad: ``residual`` (n,) of its blocks, ``columns`` (n, a) their derivatives by
+    the unknowns ``index``."""
 
     index: Indices
     columns: Array
     residual: Array
+    axis: int
 
 
 def equations(side: Side, ref: BlockMotion, layout: Unknowns, x: Array, gravity: float) -> Iterator[Equation]:
-    """The three sensors of a triad at unknowns ``x`` (P,)."""
+    """The sensors of a triad at unknowns ``x`` (P,)."""
     places = layout.places
     B = x[places[f"gain {side.sensor}"]].reshape(3, 3)
     force = gravity * ref.C_bn[:, :, 2]
@@ -173,7 +191,7 @@ def equations(side: Side, ref: BlockMotion, layout: Unknowns, x: Array, gravity:
         errors = side.rate_change(ref.rate)
         slope = ref.rate_slope + ref.C_slope @ h
     turned = errors @ x[side.error_places]
-    for i in range(3):
+    for i in side.blocks.axes:
         if side.sensor == "acc":
             own, label = ref.arm, places["lever arm"][3 * i : 3 * i + 3]
             # the gain does not act on the lever arm in the derivatives: else an arm would seem to tell of it
@@ -209,4 +227,4 @@ def equations(side: Side, ref: BlockMotion, layout: Unknowns, x: Array, gravity:
             index.append(G_i)
             columns.append(force)
             predicted = predicted + force @ x[G_i]
-        yield Equation(np.concatenate(index), np.hstack(columns), side.blocks.y[:, i] - predicted)
+        yield Equation(np.concatenate(index), np.hstack(columns), side.blocks.y[:, i] - predicted, i)

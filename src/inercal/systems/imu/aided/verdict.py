@@ -62,7 +62,9 @@ def verdict(
     for triad in triads:
         identified = fit.identified[triad]
         weak = [
-            name for name in identified.names if _relative(name, values, u) > LIMITS.unknown_coefficient_u
+            name
+            for name in identified.names
+            if name in values and _relative(name, values, u) > LIMITS.unknown_coefficient_u
         ]
         if weak:
             return (
@@ -71,7 +73,7 @@ def verdict(
             )
     for triad in triads:
         identified = fit.identified[triad]
-        if identified.condition > WORST_BY_SIZE:
+        if identified.condition > WORST_BY_SIZE and set(identified.names) <= set(values):
             term = identified.leading_term()
             return (
                 Status.ILL_CONDITIONED,
@@ -81,11 +83,18 @@ def verdict(
             )
     if not fit.converged:
         return Status.NOT_CONVERGED, "the fit of all sensors together did not settle: look at the residuals"
-    conditions = ", ".join(f"{fit.identified[triad].condition:.1f} ({_WORDS[triad]})" for triad in triads)
-    return (
-        Status.OK,
-        f"{len(values)} coefficients from {counted(rests, 'rest')} and the turns between; condition {conditions}",
+    if not any(name.startswith(("K1_", "M_", "S_", "T_")) for name in values):
+        return (
+            Status.UNOBSERVABLE,
+            "the turns about one axis tell no scale factor: turn by more, at other attitudes",
+        )
+    conditions = ", ".join(
+        f"{fit.identified[triad].condition:.1f} ({_WORDS[triad]})"
+        for triad in triads
+        if set(fit.identified[triad].names) <= set(values)
     )
+    from_turns = f"{counted(len(values), 'coefficient')} from {counted(rests, 'rest')} and the turns between"
+    return Status.OK, f"{from_turns}; condition {conditions}" if conditions else from_turns
 
 
 def _cure(fit: AidedFit, triad: str) -> str:
@@ -101,7 +110,7 @@ def _cure(fit: AidedFit, triad: str) -> str:
 
 def _sensor_names(fit: AidedFit) -> list[str]:
     """Names of the sensors in the fit."""
-    return [f"{sensor.side.sensor}_{'xyz'[k % 3]}" for k, sensor in enumerate(fit.sensors)]
+    return [sensor.name for sensor in fit.sensors]
 
 
 def _in_turns(sensor: Sensor) -> float:
@@ -120,10 +129,12 @@ def _shift(sensor: Sensor) -> float:
 def scatter(fit: AidedFit, gravity: float) -> float:
     """Angle [rad] that shifts of the accelerometers with each turn amount to; 0 where there are none."""
     sensors = of_triad(fit, "acc")
+    if not sensors:
+        return 0.0
     scale = np.abs(np.diag(fit.x[fit.unknowns.places["gain acc"]].reshape(3, 3)))
     angles = [
-        _shift(sensor) / (gravity * size) if sensor.noise.excess > 0.0 else 0.0
-        for sensor, size in zip(sensors, scale, strict=True)
+        _shift(sensor) / (gravity * scale[sensor.axis]) if sensor.noise.excess > 0.0 else 0.0
+        for sensor in sensors
     ]
     return max(angles)
 
@@ -153,7 +164,10 @@ def _unit_words(fit: AidedFit, triad: str) -> str:
     if unit.dimension in RAW:
         return ""
     gain = fit.x[fit.unknowns.places[f"gain {triad}"]].reshape(3, 3)
-    ratio = float(np.median(np.abs(np.diag(gain)))) * unit.factor
+    ratio = (
+        float(np.median([abs(gain[sensor.axis, sensor.axis]) for sensor in of_triad(fit, triad)]))
+        * unit.factor
+    )
     if 0.5 < ratio < 2.0:
         return ""
     return (
@@ -211,8 +225,8 @@ def findings(
     for triad in fit.identified:
         sensors = of_triad(fit, triad)
         moved = [
-            f"{axis} {sensor.noise.walk * np.sqrt(np.ptp(sensor.side.blocks.middle)):.2g}"
-            for axis, sensor in zip("xyz", sensors, strict=True)
+            f"{'xyz'[sensor.axis]} {sensor.noise.walk * np.sqrt(np.ptp(sensor.side.blocks.middle)):.2g}"
+            for sensor in sensors
             if sensor.noise.drift > LIMITS.wander_gain
         ]
         if moved:

@@ -72,9 +72,10 @@ def misfits(
 def _biases(fit: AidedFit, names: tuple[str, ...], patterns: Sequence[Array]) -> Array:
     """Means (p,) of patterns in the biases of the sensors."""
     means = np.zeros(len(names))
-    for k, (sensor, pattern) in enumerate(zip(fit.sensors, patterns, strict=True)):
-        bias = f"{'K0' if sensor.side.sensor == 'acc' else 'D_F'}_{'xyz'[k % 3]}"
-        means[names.index(bias)] = mean_bias(sensor, pattern)
+    for sensor, pattern in zip(fit.sensors, patterns, strict=True):
+        bias = f"{'K0' if sensor.side.sensor == 'acc' else 'D_F'}_{'xyz'[sensor.axis]}"
+        if bias in names:
+            means[names.index(bias)] = mean_bias(sensor, pattern)
     return means
 
 

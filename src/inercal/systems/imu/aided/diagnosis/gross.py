@@ -36,6 +36,11 @@ def agreement(y: Array, x: Array) -> Agreement:
     return Agreement(scale, float(np.sqrt(np.sum((dy - scale * dx) ** 2) / size)))
 
 
+def match(blocks: Blocks, x: Array) -> Agreement:
+    """The agreement of the channels that are there with what the table says, (n, 3)."""
+    return agreement(blocks.y[:, blocks.axes], x[:, blocks.axes])
+
+
 def expected(blocks: Blocks, motion: TableMotion) -> Array:
     """Specific force in units of gravity, or rate [rad/s], (n, 3) on the instrument's axes, roughly."""
     if blocks.triad.sensor == "acc":
@@ -76,13 +81,13 @@ def cures(sides: list[Blocks], motion: TableMotion) -> Iterator[str]:
     """Sentences that would make sense of outputs that do not follow the table."""
     ranked = []
     for words, other in _angles(motion):
-        misses = [agreement(each.y, expected(each, other)).miss for each in sides]
+        misses = [match(each, expected(each, other)).miss for each in sides]
         if max(misses) < LIMITS.agreement_miss:
             ranked.append((sum(misses), words))
     identity = ("+x", "+y", "+z")
     inputs = [expected(each, motion) for each in sides]
     for axes, turn in mountings().items():
-        misses = [agreement(each.y, x @ turn).miss for each, x in zip(sides, inputs, strict=True)]
+        misses = [match(each, x @ turn).miss for each, x in zip(sides, inputs, strict=True)]
         if axes != identity and max(misses) < LIMITS.agreement_miss:
             ranked.append((sum(misses), _mounted(motion, turn)))
     if ranked:
@@ -127,17 +132,18 @@ def _mounted(motion: TableMotion, turn: Array) -> str:
 def _channels(blocks: Blocks, x: Array) -> Iterator[str]:
     """Other signs or another order of a triad's own axes."""
     sensor = blocks.triad.sensor
-    if agreement(blocks.y, x).miss < LIMITS.agreement_miss:
+    if match(blocks, x).miss < LIMITS.agreement_miss:
         return
+    axes = blocks.axes
     miss, order, signs = min(
-        (agreement(blocks.y, x[:, order] * np.array(signs)).miss, order, signs)
-        for order in itertools.permutations(range(3))
-        for signs in itertools.product((1.0, -1.0), repeat=3)
+        (agreement(blocks.y[:, axes], x[:, order] * np.array(signs)).miss, order, signs)
+        for order in itertools.permutations(range(3), len(axes))
+        for signs in itertools.product((1.0, -1.0), repeat=len(axes))
     )
     if miss < LIMITS.agreement_miss:
         measured = ", ".join(
             f"{sensor}_{name} measures {'+' if sign > 0 else '-'}{'xyz'[axis]}"
-            for name, axis, sign in zip("xyz", order, signs, strict=True)
+            for name, axis, sign in zip(("xyz"[k] for k in axes), order, signs, strict=True)
             if axis != "xyz".index(name) or sign < 0
         )
         yield f"{measured} of the mounting that is stated"

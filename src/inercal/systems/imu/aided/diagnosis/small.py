@@ -86,7 +86,7 @@ def seen(fit: AidedFit, changes: dict[str, Array], gravity: float) -> Patterns:
     for k, sensor in enumerate(fit.sensors):
         triad = sensor.side.sensor
         if triad in changes:
-            B = gain(fit, triad)[k % 3] * (gravity if triad == "acc" else 1.0)
+            B = gain(fit, triad)[sensor.axis] * (gravity if triad == "acc" else 1.0)
             patterns[k] = np.einsum("j,njq->nq", B, changes[triad])
     return patterns
 
