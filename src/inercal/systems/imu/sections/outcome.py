@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import PurePath
 from typing import Any
 
@@ -31,7 +30,6 @@ from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import stated_rows
-from inercal.systems.imu.sections.effects import effects_of
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
@@ -47,7 +45,7 @@ from inercal.systems.imu.sections.shorthands import (
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.tables import budget_item, of_moves, of_sections, relative_alignment
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -98,19 +96,11 @@ def calibrate_from_sections(
         refuse_samples(named)
         proposal = proposal_of(named, options, settings.exclude)
         proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
-        judged = partial(effects_of, in_order=isinstance(options, KnownRatesSettings))
         kept = list(named.values())
-        found = of_proposal(
-            proposal, kept, settings, temperature=temperature, judged=judged, progress=progress
-        )
+        found = of_proposal(proposal, kept, settings, temperature=temperature, progress=progress)
         result = {**found.estimate.result, "method": word_of(options)}
         found = replace(found, estimate=replace(found.estimate, result=result))
     return replace(found, estimate=timed(found.estimate, clock))
-
-
-def _nothing_more(_: SectionCalibration) -> Iterable[Finding]:
-    """No findings of a method of its own."""
-    return ()
 
 
 def of_proposal(
@@ -121,11 +111,10 @@ def of_proposal(
     *,
     backward: bool = False,
     temperature: Quantity | None = None,
-    judged: Callable[[SectionCalibration], Iterable[Finding]] = _nothing_more,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
     """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule,
-    ``temperature`` that of the recording, and ``judged`` finds what only some protocols ask.
+    ``temperature`` that of the recording.
 
     Raises `InputError` for recordings in several units.
     """
@@ -167,7 +156,7 @@ def of_proposal(
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         return without(Status.UNOBSERVABLE, text)
-    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)), *judged(found))
+    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
     return CalibrationFromSections(estimate, sections, found)
 
