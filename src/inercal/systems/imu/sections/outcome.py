@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from inercal.foundation.arrays import short_repr
-from inercal.foundation.errors import RecordError
+from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
@@ -34,6 +34,7 @@ from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
 from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.readings import side_by_side
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.shorthands import (
     Shorthand,
@@ -116,7 +117,7 @@ def of_proposal(
     """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule,
     ``temperature`` that of the recording.
 
-    Raises `InputError` for recordings in several units.
+    Raises `InputError` for recordings in several units, and for a frame that no section tells.
     """
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     sections = tuple(placed(section, options) for section in proposal.sections)
@@ -142,6 +143,11 @@ def of_proposal(
         text = why or "found no section that can be read: state them in a table, imu.sections"
         return without(Status.TOO_FEW_INTERVALS, text)
     priors = _priors(settings, units, backward=backward)
+    if priors.frame == "case" and not side_by_side(sections).directed:
+        raise StudyError(
+            "imu.frame",
+            "found case, but no section says a direction or axis, expected accelerometers, or none",
+        )
     lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
@@ -170,6 +176,7 @@ def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> P
         usual,
         clock_u=settings.time_base_u,
         mounting_u=options.mounting_u,
+        frame=options.frame,
         acc_scale=scales["acc"],
         gyro_scale=scales["gyro"],
         misalignment=usual.misalignment if options.misalignment is None else options.misalignment,
@@ -326,9 +333,7 @@ def _estimate(
     ranges: dict[str, Any] = {"specific_force_along_an_axis_m_s2": [-g, g]}
     if np.any(readings.rate != 0.0):
         ranges["rate_of_turn_rad_s"] = float(np.max(np.abs(readings.rate)))
-    known = bool(
-        np.any(readings.know_up & readings.has_force) or np.any(readings.know_axis & (readings.rate != 0.0))
-    )
+    known = readings.directed and found.problem.priors.frame != "accelerometers"
     own = _OWN if "acc" in triads else _OF_GYRO
     conditions = conditions_of(settings, temperature, ranges, frame=_KNOWN if known else own)
     sources = [source for record in records for source in record.sources]
