@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from campaigns.sessions import SessionCourse, simulate_session, true_values
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
-from inercal.systems.imu.ferraris.simulate import SessionCourse, simulate_session, true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
 from inercal.systems.imu.simulate import ImuTruth, TriadNoise, draw_full_truth
 

@@ -5,6 +5,7 @@ import tomllib
 from dataclasses import replace
 
 import numpy as np
+from campaigns.sessions import SessionCourse, quiet, simulate_session
 
 from inercal.examples import FOLDER
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
@@ -13,7 +14,6 @@ from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
-from inercal.systems.imu.ferraris.simulate import SessionCourse, quiet, simulate_session
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_full_truth
 

@@ -10,6 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from campaigns.ferraris import one_calibration
+from campaigns.sessions import true_values
 from ferraris_sessions import SETTINGS, session, with_values
 
 from inercal.faces.convert.correct import imu_model
@@ -17,10 +18,9 @@ from inercal.foundation.computing.runs import run
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput, Site
 from inercal.foundation.inference.consistency import coverage
-from inercal.foundation.units import parse_unit
+from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 from inercal.systems.imu.ferraris.names import NAMES, TERMS_OF_FERRARIS
-from inercal.systems.imu.ferraris.simulate import true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
 
 FULL = 2.0 * math.pi
@@ -158,3 +158,18 @@ def test_intervals_cover_the_truth_as_often_as_they_say(runs):
     each, least = (0.892, 0.936) if runs == RUNS else (0.7, 0.88)
     assert np.all(found.fraction >= each), found.table(TERMS_OF_FERRARIS)
     assert least <= found.pooled, found.table(TERMS_OF_FERRARIS)
+
+
+def test_the_temperature_of_the_recording_is_a_condition_of_its_result():
+    """A mean of 31 degC that scatters by 0.5; one that the study states goes before it."""
+    record, _ = session(1)
+    column = record["acc_x"]
+    kelvin = 304.15 + 0.5 * np.where(np.arange(len(column.t)) % 2, 1.0, -1.0)
+    warm = replace(column, name="temperature", unit=parse_unit("K"), values=kelvin)
+    heated = replace(record, columns={**record.columns, "temperature": warm})
+    conditions = solved(heated).conditions
+    assert conditions["temperature"]["value"] == pytest.approx(31.0)
+    assert conditions["temperature"]["u"] == pytest.approx(0.5, rel=1e-3)
+    stated = replace(SETTINGS, temperature=Quantity(20.0, 0.1, parse_unit("degC"), "20.0(1) degC"))
+    assert solved(heated, stated).conditions["temperature"]["value"] == 20.0
+    assert solved(record).conditions["temperature"] is None

@@ -168,3 +168,48 @@ def test_nothing_is_written_where_a_table_is_there(folder, capsys):
     assert "sections.csv: exists already" in capsys.readouterr().err
     assert not (folder / "imu.toml").exists()
     assert (folder / "sections.csv").read_text() == "mine\n"
+
+
+PUBLISHED = """\
+x_true (g),x_mean (g),x_std,y_true (g),y_mean (g),y_std,z_true (g),z_mean (g),z_std
+0,0.100221283,0.00211150601,0,0.0604301312,0.00466911018,1,0.773104147,0.00412562024
+0,0.0815410364,0.00320344386,0,0.0393982537,0.00207248996,-1,-1.27257495,0.00416839762
+0,0.0986019436,0.0024753762,1,1.04469521,0.00453715167,0,-0.254673405,0.00481991049
+0,0.0873405732,0.00216174451,-1,-0.95591161,0.0039568802,0,-0.247088708,0.00563292816
+1,1.09251864,0.0055073251,0,0.038673612,0.0020656836,0,-0.257947641,0.00410856375
+-1,-0.906858138,0.00571426386,0,0.048609455,0.00495654184,0,-0.239294681,0.00482510125
+"""
+
+
+def test_columns_of_true_directions_are_known_and_no_output(folder):
+    """The six rows that a public table publishes. Half differences by the local gravity are 1.00064, 1.00125, 1.02381;
+    rows of 1.8 mg do not tell them better than 14e-4."""
+    (folder / "means.csv").write_text(PUBLISHED)
+    assert run(["new", "imu", "means.csv", "--set", 'site.gravity="9.7973(5) m/s^2"']) == 0
+    assert [side_of(row.up) for row in read_table("sections.csv")] == ["+z", "-z", "+y", "-y", "+x", "-x"]
+    code, result = calibrated(["means.csv"], "--map", "imu-map.toml")
+    assert code == 0
+    values = {p["name"]: p for p in result["parameters"]}
+    for axis, half in zip("xyz", (1.00064, 1.00125, 1.02381), strict=True):
+        K1 = values[f"K1_{axis}"]
+        assert K1["value"] * 9.80665 == pytest.approx(half, abs=1e-4)
+        assert 5e-4 < K1["u"] * 9.80665 < 2e-3
+
+
+def test_true_forces_of_any_size_are_forces(folder):
+    """A shaker beside a reference: sizes of 0.3 to 2 g, stated in m/s^2, give scale factors that gravity does not."""
+    unit = Unit(np.random.default_rng(9), misalignment=0.0, k2=0.0)
+    rng = np.random.default_rng(10)
+    forces = rng.normal(0.0, 8.0, (14, 3))
+    rows = np.hstack([unit.accelerometers(forces) + rng.normal(0.0, 1e-3, forces.shape), forces])
+    head = ",".join([*(f"acc_{a} [m/s^2]" for a in "xyz"), *(f"acc_{a}_true [m/s^2]" for a in "xyz")])
+    written(folder / "shaker.csv", head, rows)
+    assert run(["new", "imu", "shaker.csv", *SITE]) == 0
+    table = read_table("sections.csv")
+    np.testing.assert_allclose([row.force for row in table], forces, rtol=1e-6)
+    code, result = calibrated(["shaker.csv"], "--map", "imu-map.toml")
+    assert code == 0
+    for p in result["parameters"]:
+        if p["name"].startswith(("K0", "K1")):
+            assert abs(p["value"] - unit.truth[p["name"]]) < 4.0 * p["u"]
+            assert p["u"] < 2e-3

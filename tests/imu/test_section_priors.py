@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from turned_units import SIDES, Bench, Unit
+from turned_units import EARTH, SIDES, Bench, Unit
 
 from inercal.cli import run
 from inercal.faces.python.verbs import calibrate
@@ -92,3 +92,64 @@ def test_a_prior_about_another_value_is_refused(tmp_path, monkeypatch, capsys, k
     (tmp_path / "means.csv").write_text("acc_x [g],acc_y [g],acc_z [g]\n" + "0,0,1\n" * 6)
     assert run(["calibrate", "imu", "means.csv", "--study", "imu.toml"]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_the_frame_is_that_of_the_accelerometers_where_a_study_says_so(means, tmp_path):
+    """Known sides then tell biases and scale factors, and T against M, but not how the case lies."""
+    path = tmp_path / "imu.toml"
+    found = []
+    for keys in ("", 'frame = "case"\n', 'frame = "accelerometers"\n'):
+        path.write_text(HEAD + keys + ROWS)
+        found.append(calibrate(means, path).estimate)
+    usual, case, own = found
+    np.testing.assert_array_equal(usual.values, case.values)
+    assert not {"M_yx", "M_zx", "M_zy"} & set(own.names)
+    assert "accelerometer z" in own.conditions["frame"]
+    assert "case" in case.conditions["frame"]
+    for name in ("K0_x", "K1_y", "K1_z"):
+        assert abs(own[name].value - case[name].value) < 0.1 * case[name].u
+        assert own[name].u == pytest.approx(case[name].u, rel=0.1)
+    for x, y in ("xy", "xz", "yz"):  # angles between axes are those of the case
+        between = case[f"M_{x}{y}"].value + case[f"M_{y}{x}"].value
+        assert own[f"M_{x}{y}"].value == pytest.approx(between, abs=1e-4)  # to first order
+
+
+def test_a_frame_that_no_section_tells_is_refused(means, tmp_path):
+    path = tmp_path / "imu.toml"
+    blank = "".join(f'[[imu.section]]\nsection = "{side}"\n' for side in SIDES)
+    path.write_text(HEAD + 'frame = "case"\n' + blank)
+    with pytest.raises(StudyError, match="no section says a direction or axis"):
+        calibrate(means, path)
+    path.write_text(HEAD + 'frame = "accelerometers"\nmounting = "0(1) deg"\n' + ROWS)
+    with pytest.raises(StudyError, match="which leaves it open"):
+        load_study(SYSTEMS["imu"], path, ())
+
+
+def test_north_tells_the_level_part_of_earth_rate(tmp_path):
+    """A gyro for navigation on six sides: the heading, known to a degree, makes its bias surer, and right."""
+    unit = Unit(np.random.default_rng(12), g_sensitivity=1e-9, misalignment=0.0)
+    norths = ["+y", "+y", "+z", "+z", "+x", "+x"]
+    rests = []
+    for side, north in zip(SIDES, norths, strict=True):
+        up, to = SIDES[side], SIDES[north]
+        earth = EARTH * (np.cos(unit.latitude) * to + np.sin(unit.latitude) * up)
+        rests.append((unit.accelerometers(9.81 * up), unit.gyro(earth, 9.81 * up)))
+    columns = [
+        (f"{sensor}_{axis}", parse_unit(symbol), np.array([rest[k][i] for rest in rests]))
+        for k, (sensor, symbol) in enumerate((("acc", "m/s^2"), ("gyro", "rad/s")))
+        for i, axis in enumerate("xyz")
+    ]
+    record = record_of(columns, np.arange(len(rests), dtype=float))
+    path = tmp_path / "imu.toml"
+    u = {}
+    for said in ("", 'north = "{}"\nnorth_u = "1 deg"\n'):
+        rows = "".join(
+            f'[[imu.section]]\nsection = "{side}"\nup = "{side}"\n' + said.format(north)
+            for side, north in zip(SIDES, norths, strict=True)
+        )
+        path.write_text(HEAD + rows)
+        found = calibrate(record, path).estimate
+        u[bool(said)] = np.array([found[f"D_F_{axis}"].u for axis in "xyz"])
+    off = np.array([found[f"D_F_{axis}"].value - unit.truth[f"D_F_{axis}"] for axis in "xyz"])
+    assert np.all(u[True] < 0.5 * u[False])
+    assert np.all(np.abs(off) < 3.0 * u[True])

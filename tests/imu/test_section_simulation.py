@@ -13,6 +13,7 @@ from inercal.systems.imu.sections.course import Pace, course, sampled
 from inercal.systems.imu.sections.cutting.table import of_tables
 from inercal.systems.imu.sections.outcome import calibrate_from_sections
 from inercal.systems.imu.sections.simulate import simulate_sections
+from inercal.systems.imu.task import simulate
 from inercal.systems.listed import SYSTEMS
 
 SITE = '[site]\nlatitude = "48 deg"\ngravity = "9.809(1) m/s^2"\n[imu]\nmethod = "sections"\n'
@@ -183,3 +184,15 @@ def test_rests_found_in_a_log_end_where_the_gyro_begins_to_turn(tmp_path):
         S, D_F = found[f"S_{axis}"], found[f"D_F_{axis}"]
         assert abs(S.value / truth.values()[f"S_{axis}"] - 1.0) < 5e-4
         assert D_F.u / S.value < 5e-5
+
+
+def test_a_restless_start_trembles_in_the_first_section_alone(tmp_path):
+    """By 0.3 deg of attitude, which turns g by 5e-3: nothing else of the recording changes."""
+    quiet = QUIET + 'accelerometer_noise = "0 ug/sqrt(Hz)"\ngyro_noise = "0 deg/sqrt(h)"\n'
+    calm, restless = (
+        simulate(study_of(tmp_path, HEAD + SIDES, simulation=quiet + more), np.random.default_rng(3))
+        for more in ("", '[disturbances]\nrestless_start = "0.3 deg"\n')
+    )
+    first = np.array(calm.labels) == "+x"
+    change = (restless.triad("acc").values - calm.triad("acc").values) / 415.0
+    assert 0.01 < np.sqrt(np.mean(change[first] ** 2)) < 0.06

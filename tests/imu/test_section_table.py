@@ -44,7 +44,7 @@ def test_every_cell_comes_back(tmp_path):
     row = SectionRow(
         "tilted", "log.csv", 1.25, 7.5, "rate", np.array([0.6, 0.0, 0.8]), np.array([0.1, -0.2, 9.7]),
         np.array([0.0, -1.0, 0.0]), parse_quantity("0.5(2) rad/s", "rate", "r"), None, 0.005, 0.001,
-        "a", "day 1", "table", "log", 298.15, "row, with a comma",
+        np.array([0.0, 0.6, -0.8]), 0.02, "a", "day 1", "table", "log", 298.15, "row, with a comma",
     )  # fmt: skip
     path = tmp_path / "sections.csv"
     write_table([row], path)
@@ -81,6 +81,7 @@ def test_tables_of_a_study_say_the_same():
         ("rate", "30 deg/s", "for a section of kind rest, expected kind rate"),
         ("force", "1 2 g", "expected a force such as 0 0 9.81 m/s^2, or three channels"),
         ("level", "-1 deg", "found a negative uncertainty"),
+        ("north", "up", "expected an axis such as +x or -z, or three numbers"),
     ],
 )
 def test_a_wrong_cell_is_named_with_file_line_and_column(tmp_path, column, cell, said):

@@ -62,6 +62,7 @@ _METHODS = {
     "level": ("sections",),
     "misalignment": ("sections",),
     "mounting": ("sections",),
+    "frame": ("sections",),
     "clock": ("sections",),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
@@ -159,6 +160,12 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default=None,
         description="of sections: rotation of the case against what is said of directions and axes; 0 if absent",
     )
+    frame: Literal["case", "accelerometers"] | None = Field(
+        default=None,
+        description="of sections: axes of the coefficients: case, those of the directions and axes that are known; "
+        "accelerometers, z along the input axis of accelerometer z, y in the plane of y and z, however the unit sits "
+        "in its case; if absent the case where any direction is known",
+    )
     clock: Annotated[Quantity, _about_zero("number", "0(20) ppm")] | None = Field(
         default=None,
         description="of sections: relative error of the record's clock, in the place of time_base",
@@ -216,6 +223,10 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         check_kind(ImuSettings, self, self.method, "method")
         if self.sections is not None and self.section:
             raise refusal("found beside sections, expected one of the two", "section")
+        if self.mounting is not None and self.frame == "accelerometers":
+            raise refusal(
+                "found with frame = 'accelerometers', which leaves it open, expected neither", "mounting"
+            )
         if self.clock is not None and "time_base" in self.model_fields_set:
             raise refusal("found beside time_base, expected one of the two", "clock")
         for key in self.model_fields_set - {"method"}:
@@ -291,6 +302,7 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
                 None if table.level is None else table.level.value,
                 None if table.misalignment is None else table.misalignment.u,
                 0.0 if table.mounting is None else table.mounting.u,
+                table.frame or "",
             )
     return None
 

@@ -18,9 +18,9 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.results.result import Estimate
 from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
-from inercal.systems.imu.ferraris.simulate import SessionCourse, quiet, simulate_session, true_values
-from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
-from inercal.systems.imu.simulate import draw_full_truth
+from inercal.systems.imu.ferraris.nine import as_sections
+from inercal.systems.imu.sections.simulate import simulate_sections
+from inercal.systems.imu.settings import FerrarisSettings, ImuSettings, Simulation
 from inercal.systems.imu.task import calibrate
 from inercal.systems.imu.temperature.sweep import fit_recording
 
@@ -198,9 +198,14 @@ _SEED = 20230518
 def _session() -> tuple[Estimate, Array]:
     """Six positions and three turns of an instrument without noise: the calibration and the truth (33,)."""
     rng = np.random.default_rng(_SEED)
-    record, truth = simulate_session(quiet(draw_full_truth(rng)), SessionCourse(), rng)
-    settings = ImuSettings(Site(9.81), k2_u=0.0, method=FerrarisSettings())
-    return calibrate(record, settings).estimate, true_values(truth)
+    options = FerrarisSettings()
+    quiet = Simulation(hold=5.0, turning=5.0, sample_rate=50.0, accelerometer_noise=0.0, gyro_noise=0.0,
+                       accelerometer_wander=0.0, gyro_wander=0.0)  # fmt: skip
+    pole = 0.5 * np.pi  # where earth rate is vertical, and known
+    settings = ImuSettings(Site(9.81, (), pole), k2_u=0.0, method=options, simulation=quiet)
+    record, truth = simulate_sections(settings, as_sections(options), pole, rng)
+    values = truth.values()
+    return calibrate(record, settings).estimate, np.array([values[name] for name in TERMS_OF_FERRARIS])
 
 
 def _session_errors() -> Array:

@@ -36,9 +36,9 @@ def evidence_of(fit: JudgedFit) -> FitEvidence:
     return evidence(fit.residuals, fit.covariance, columns, fit.gain, fit.noise_dof)
 
 
-def judge(fit: JudgedFit, share: float = 1.0) -> tuple[Finding, ...]:
-    """Findings about a fit: order of the rows, ends and steps of the outputs, and what the questions show; ``share`` of
-    the risk, where a result has several fits."""
+def judge(fit: JudgedFit, share: float = 1.0, more: Sequence[Question] = ()) -> tuple[Finding, ...]:
+    """Findings about a fit: order of the rows, ends and steps of the outputs, and what the questions show, those of its
+    own physics (``more``) among them; ``share`` of the risk, where a result has several fits."""
     if len(fit.residuals) > LIMITS.most_readings:
         return ()
     try:
@@ -51,7 +51,7 @@ def judge(fit: JudgedFit, share: float = 1.0) -> tuple[Finding, ...]:
     order = tuple(_order(fit, of_fit, share * LIMITS.order_risk))
     if order:  # rows at other inputs: all questions would answer
         return order
-    pairs = asked_of(of_fit, questions(fit))
+    pairs = asked_of(of_fit, [*more, *questions(fit)])
     spoken = answers(fit.names, fit.u, of_fit, pairs, share)
     return (*ends(fit), *steps(fit), *copies(fit), *uneven(fit, of_fit, share), *spoken)
 

@@ -14,6 +14,7 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     (r"t", ("time",), None),
     (r"acc_[xyz]", ("acceleration", *RAW), "velocity"),
     (r"a[1-9]\d*", ("acceleration", "count", "voltage"), "velocity"),
+    (r"up_[xyz]", ("acceleration", "number"), None),
     (r"gyro_[xyz]", ("rate", *RAW), "angle"),
     (r"gyro|gyro_roll|gyro_yaw", ("rate", "count", "voltage"), "angle"),
     (r"wc_[xyz]", ("rate", "count"), "angle"),
@@ -34,7 +35,20 @@ _CHANNELS: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
 _EXAMPLES = (
     *(f"{sensor}_{axis}" for sensor in ("acc", "gyro", "wc", "th", "th_rate", "th_acc") for axis in "xyz"),
     *("t", "temperature", "label", "position", "phi1", "phi2", "phi3", "rate", "joint", "y_x", "y_y"),
-    *("a1", "a2", "a3", "a4", "gyro", "gyro_roll", "gyro_yaw", "point", "trigger", "theta_ref", "q_ref_0"),
+    *(
+        "up_x",
+        "a1",
+        "a2",
+        "a3",
+        "a4",
+        "gyro",
+        "gyro_roll",
+        "gyro_yaw",
+        "point",
+        "trigger",
+        "theta_ref",
+        "q_ref_0",
+    ),
 )
 
 #: Where a channel is found in a file: column number, header or variable name, or variable and column.

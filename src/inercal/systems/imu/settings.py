@@ -168,6 +168,8 @@ class SectionsSettings:
         Standard deviation of M and T about 0 [rad]; as usual if absent.
     mounting_u : float
         Standard uncertainty of the case against directions and axes [rad].
+    frame : str
+        Frame of the coefficients, as its key says; empty: as the sections tell.
     """
 
     table: Path | None = None
@@ -176,6 +178,7 @@ class SectionsSettings:
     level: float | None = None
     misalignment: float | None = None
     mounting_u: float = 0.0
+    frame: str = ""
 
 
 Method: TypeAlias = (

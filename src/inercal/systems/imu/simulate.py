@@ -11,13 +11,16 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.earth import earth_rate
 from inercal.foundation.geometry.rotations import conjugate, exp, log, multiply, rotate
-from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
+from inercal.foundation.instruments.terms import (
+    ACCELEROMETER_TRIAD,
+    ACCELEROMETERS_IN_A_FRAME,
+    GYRO_G_SENSITIVITY,
+    GYRO_TRIAD,
+)
 from inercal.foundation.instruments.triad import TriadModel, triad_from_terms
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.settings import Disturbances, Simulation
-
-_LOWER = (("y", "x"), ("z", "x"), ("z", "y"))
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class ImuTruth:
 
     def values(self) -> dict[str, float]:
         """True coefficients by term symbol."""
-        triads = ((self.accelerometer, ACCELEROMETER_TRIAD), (self.gyro, GYRO_TRIAD))
+        triads = ((self.accelerometer, ACCELEROMETERS_IN_A_FRAME), (self.gyro, GYRO_TRIAD))
         coefficients: dict[str, float] = {}
         for model, symbols in triads:
             numbers = {"bias": iter(model.bias), "scale": iter(model.scale)}
@@ -235,8 +238,7 @@ def clipped(gyro: Array, model: TriadModel, disturbances: Disturbances) -> Array
 
 def with_values(truth: ImuTruth, values: Mapping[str, float]) -> ImuTruth:
     """The instrument with these coefficients by term symbol in the place of its own."""
-    lower = {f"M_{i}{j}": truth.accelerometer.misalignment["xyz".index(i), "xyz".index(j)] for i, j in _LOWER}
-    whole = lower | truth.values() | dict(values)
+    whole = truth.values() | dict(values)
     g = np.array([[whole[f"G_{i}{j}"] for j in "xyz"] for i in "xyz"])
     return replace(
         truth,

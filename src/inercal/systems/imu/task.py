@@ -162,9 +162,10 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
 
             return simulate_sections(settings, settings.method, settings.site.latitude, rng)[0]
         case FerrarisSettings():
-            from inercal.systems.imu.ferraris.simulate import simulate_study as simulate_session
+            from inercal.systems.imu.ferraris.nine import as_sections
+            from inercal.systems.imu.sections.simulate import simulate_sections
 
-            return simulate_session(settings, settings.method, rng)
+            return simulate_sections(settings, as_sections(settings.method), settings.site.latitude, rng)[0]
         case AidedSettings():
             from inercal.systems.imu.aided.simulate import simulate_study as simulate_table
 

@@ -27,7 +27,8 @@ _FULL_SCALE = 2100.0  # deg/s
 
 @dataclass(frozen=True)
 class SensorFound:
-    """Three columns of a table, in the order x, y, z, taken for a sensor (``acc`` or ``gyro``).
+    """Three columns of a table, in the order x, y, z, taken for a sensor (``acc`` or ``gyro``), or ``up``, what is
+    known of specific force.
 
     ``grade`` is ``certain`` (words for the sensor and words or physics for the unit), ``likely`` (physics alone, one
     reading) or ``guess``, which has a ``question``; ``reason`` says why in one line.
@@ -61,14 +62,37 @@ def sensors(
     """
     if not any(names):
         return _nameless(values, t, file)
-    triads = _by_name(names, units or (None,) * len(names), values, file)
+    units = units or (None,) * len(names)
+    triads = _by_name(names, units, values, file)
     acc = _accelerometer(triads, values)
     found = [] if acc is None else [_with_acc_unit(acc, values)]
     gyro, seen = _gyro(triads, acc, values, t)
     if gyro is not None:
         beside_counts = any("count" in triad.units for triad in found)
         found.append(_with_gyro_unit(gyro, seen, values, t is not None, beside_counts))
-    return found
+    return [*found, *_known_force(names, units, values)]
+
+
+def _known_force(names: Sequence[str], units: Sequence[str | None], values: Array) -> list[SensorFound]:
+    """Columns such as ``x_true`` or ``up_x``: directions of specific force that are known, or this itself."""
+    axes: dict[str, tuple[int, Said]] = {}
+    for index, (name, unit) in enumerate(zip(names, units, strict=True)):
+        words = said(name, unit)
+        if words.axis and words.sensor in ("", "acc") and {"true", "up"} & set(words_of(name)):
+            axes.setdefault(words.axis, (index, words))
+    if len(axes) < 3:
+        return []
+    x, y, z = (axes[axis] for axis in "xyz")
+    columns = x[0], y[0], z[0]
+    stated = x[1].unit
+    unit = stated if MEASURED.get(stated) == "acc" else ""
+    if not unit:
+        unit = "number" if is_direction(values[:, columns]) else gravity_unit(values[:, columns])
+    if not unit or unit == "count":
+        return []
+    return [
+        SensorFound("up", columns, (unit,) * 3, "certain", f"the header says {quoted(names[x[0]].strip())}")
+    ]
 
 
 def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, file: str) -> list[_Named]:

@@ -19,10 +19,10 @@ from inercal.foundation.records.places import counted_names, places
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import shown
 from inercal.systems.imu.ferraris.names import NAMES, POSITIONS, TURNS, UP
-from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of
+from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of, side_of
 from inercal.systems.imu.sections.cutting.which_turn import found_in_log
 from inercal.systems.imu.sections.cutting.words import claim
-from inercal.systems.imu.settings import FerrarisSettings
+from inercal.systems.imu.settings import FerrarisSettings, SectionsSettings
 
 Rows = NDArray[np.int64]
 
@@ -43,6 +43,18 @@ class NineSections:
     def missing(self) -> tuple[str, ...]:
         """Names of the sections there are not."""
         return tuple(name for name in NAMES if name not in self.spans)
+
+
+def as_sections(options: FerrarisSettings) -> SectionsSettings:
+    """The sections of a session as it is meant: six sides, then each axis upright again and turned about."""
+    rows: list[dict[str, object]] = [
+        {"section": name, "up": side_of(up)} for name, up in zip(POSITIONS, UP, strict=True)
+    ]
+    angle = quantity_of(options.turn, options.turn_u, "deg").text
+    for name, up in zip(TURNS, UP[::2], strict=True):
+        side = side_of(up)
+        rows.append({"section": name, "kind": "turn", "up": side, "axis": side, "angle": angle})
+    return SectionsSettings(rows=tuple(rows), placing=options.alignment or 0.0)
 
 
 def nine_sections(record: Record, file: str, options: FerrarisSettings) -> NineSections:

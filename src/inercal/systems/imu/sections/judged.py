@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.judge import asked_of, blind, evidence_of, judge
-from inercal.foundation.inference.questions import JudgedFit, StatedInput, questions
+from inercal.foundation.inference.questions import JudgedFit, Question, StatedInput, questions
 from inercal.systems.imu.sections.calibration import SectionCalibration, in_outputs
+from inercal.systems.imu.sections.cutting.cut import ENDS
 from inercal.systems.imu.sections.outputs import rows
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, LOCAL, RATE, S
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, LOCAL, RATE, S
 
 _CHANNELS = (*(f"acc_{axis}" for axis in "xyz"), *(f"gyro_{axis}" for axis in "xyz"))
 
@@ -25,8 +27,40 @@ def judged_sections(found: SectionCalibration) -> tuple[Finding, ...]:
         of_fit = evidence_of(fit)
     except np.linalg.LinAlgError:
         return ()
-    unseen = blind(fit.names, fit.u, of_fit, asked_of(of_fit, questions(fit))) if of_fit.dof > 0 else ()
-    return (*judge(fit), *unseen)
+    more = [*_of_physics(found, fit)]
+    pairs = asked_of(of_fit, [*more, *questions(fit)])
+    unseen = blind(fit.names, fit.u, of_fit, pairs) if of_fit.dof > 0 else ()
+    return (*judge(fit, more=more), *unseen)
+
+
+def _of_physics(found: SectionCalibration, fit: JudgedFit) -> Iterator[Question]:
+    """Questions that name their cause: K2 beyond what was known of it, where |f| = g in unknown directions tells it; a
+    bias of the gyro that drifts alike in all turns, which leaves S and T as they are."""
+    readings, per_channel = found.problem.readings, fit.per_channel
+    if "acc" in (name[:3] for name in fit.channels) and not readings.know_up.any():
+        force = [
+            (fit.predicted - found.point.x[K0]["xyz".index(name[-1])]) * per_channel[:, k]
+            for k, name in enumerate(fit.channels)
+            if name.startswith("acc")
+        ]
+        yield Question(
+            "reading", "the accelerometers", True, "curve", "with the square of specific force",
+            np.stack(force, axis=1) ** 2, "unmodelled_k2", "Set imu.k2 = true, or state their u.",
+        )  # fmt: skip
+    turns = {section.name for section in readings.sections if section.kind == "turn"}
+    before, after = (
+        np.array([s.name.endswith(end) and s.name.removesuffix(end) in turns for s in readings.sections])
+        for end in ENDS
+    )
+    if before.any():
+        of_section = after.astype(float) - before
+        cell = fit.row // (1 + bool(readings.seen[:, 1].any()))
+        share = np.where(fit.channel >= 0, of_section[np.minimum(cell, len(of_section) - 1)], 0.0)
+        gyro = [k for k, name in enumerate(fit.channels) if name.startswith("gyro")]
+        yield Question(
+            "order", "the biases of the gyro", True, "drift", "alike in all turns, from before to after",
+            share[:, None] * per_channel[:, gyro], "bias_drift", "Wait until the gyro is warm.",
+        )  # fmt: skip
 
 
 class _Dense(NamedTuple):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import PurePath
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from inercal.foundation.arrays import short_repr
-from inercal.foundation.errors import RecordError
+from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
@@ -31,11 +30,11 @@ from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import stated_rows
-from inercal.systems.imu.sections.effects import effects_of
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves
 from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.readings import side_by_side
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.shorthands import (
     Shorthand,
@@ -47,7 +46,7 @@ from inercal.systems.imu.sections.shorthands import (
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.tables import budget_item, of_moves, of_sections, relative_alignment
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -98,19 +97,11 @@ def calibrate_from_sections(
         refuse_samples(named)
         proposal = proposal_of(named, options, settings.exclude)
         proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
-        judged = partial(effects_of, in_order=isinstance(options, KnownRatesSettings))
         kept = list(named.values())
-        found = of_proposal(
-            proposal, kept, settings, temperature=temperature, judged=judged, progress=progress
-        )
+        found = of_proposal(proposal, kept, settings, temperature=temperature, progress=progress)
         result = {**found.estimate.result, "method": word_of(options)}
         found = replace(found, estimate=replace(found.estimate, result=result))
     return replace(found, estimate=timed(found.estimate, clock))
-
-
-def _nothing_more(_: SectionCalibration) -> Iterable[Finding]:
-    """No findings of a method of its own."""
-    return ()
 
 
 def of_proposal(
@@ -121,13 +112,12 @@ def of_proposal(
     *,
     backward: bool = False,
     temperature: Quantity | None = None,
-    judged: Callable[[SectionCalibration], Iterable[Finding]] = _nothing_more,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
     """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule,
-    ``temperature`` that of the recording, and ``judged`` finds what only some protocols ask.
+    ``temperature`` that of the recording.
 
-    Raises `InputError` for recordings in several units.
+    Raises `InputError` for recordings in several units, and for a frame that no section tells.
     """
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
     sections = tuple(placed(section, options) for section in proposal.sections)
@@ -153,6 +143,11 @@ def of_proposal(
         text = why or "found no section that can be read: state them in a table, imu.sections"
         return without(Status.TOO_FEW_INTERVALS, text)
     priors = _priors(settings, units, backward=backward)
+    if priors.frame == "case" and not side_by_side(sections).directed:
+        raise StudyError(
+            "imu.frame",
+            "found case, but no section says a direction or axis, expected accelerometers, or none",
+        )
     lacking = missing(sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
@@ -167,7 +162,7 @@ def of_proposal(
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         return without(Status.UNOBSERVABLE, text)
-    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)), *judged(found))
+    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
     return CalibrationFromSections(estimate, sections, found)
 
@@ -181,6 +176,7 @@ def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> P
         usual,
         clock_u=settings.time_base_u,
         mounting_u=options.mounting_u,
+        frame=options.frame,
         acc_scale=scales["acc"],
         gyro_scale=scales["gyro"],
         misalignment=usual.misalignment if options.misalignment is None else options.misalignment,
@@ -337,9 +333,7 @@ def _estimate(
     ranges: dict[str, Any] = {"specific_force_along_an_axis_m_s2": [-g, g]}
     if np.any(readings.rate != 0.0):
         ranges["rate_of_turn_rad_s"] = float(np.max(np.abs(readings.rate)))
-    known = bool(
-        np.any(readings.know_up & readings.has_force) or np.any(readings.know_axis & (readings.rate != 0.0))
-    )
+    known = readings.directed and found.problem.priors.frame != "accelerometers"
     own = _OWN if "acc" in triads else _OF_GYRO
     conditions = conditions_of(settings, temperature, ranges, frame=_KNOWN if known else own)
     sources = [source for record in records for source in record.sources]

@@ -28,6 +28,8 @@ class Priors:
     """Relative standard uncertainty of the clock."""
     mounting_u: float = 0.0
     """Standard uncertainty [rad] of the rotation between the case and all that is said of directions and axes."""
+    frame: str = ""
+    """Frame of the coefficients: ``case``, ``accelerometers``; empty: the case where a direction or axis is known."""
     acc_scale: Size | None = field(default=Size(1.0, 0.05))
     """K1 beforehand and its relative standard deviation; None: outputs in counts of unknown scale."""
     gyro_scale: Size | None = field(default=Size(1.0, 0.05))

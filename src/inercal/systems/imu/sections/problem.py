@@ -276,7 +276,8 @@ def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) 
             sd[[vector.start + i for vector in vectors] + rows] = 0.0
     sd[G] = np.where(np.repeat(readings.channels[1], 3), sd[G], 0.0)
     # known directions define the frame; else the accelerometers; else the gyro
-    if not np.any((readings.know_up & readings.has_force) | (readings.know_axis & (readings.rate != 0.0))):
+    by_itself = priors.frame == "accelerometers" or not readings.directed
+    if by_itself:
         sd[(M if readings.channels[0].any() else T).start + np.array([2, 4, 5])] = 0.0
     sure = site.latitude is not None
     blind = bool(np.any((readings.rate != 0.0) & ~readings.know_axis & ~readings.tied))
@@ -286,7 +287,7 @@ def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) 
     )
     mean[EARTH_UP], sd[EARTH_UP] = site.vertical_rate, site.vertical_rate_u
     sd[EARTH_ALONG] = (abs(site.vertical_rate) if sure else ANY_EARTH) if blind else 0.0
-    sd[CLOCK], sd[MOUNTING] = priors.clock_u, priors.mounting_u
+    sd[CLOCK], sd[MOUNTING] = priors.clock_u, np.inf if by_itself and readings.directed else priors.mounting_u
     for k, name in enumerate(readings.rate_groups):
         parts = [abs(s.rate_u / s.rate) for s in readings.sections if s.rate_group == name and s.rate]
         sd[COMMON + k] = max(parts, default=0.0)

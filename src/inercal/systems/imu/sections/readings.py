@@ -68,6 +68,11 @@ class SectionArrays:
     channels: Flags
     """Channels (2, 3) that are there, of accelerometers and gyro."""
 
+    @property
+    def directed(self) -> bool:
+        """True where some direction or axis is known, which tells the axes of the case."""
+        return bool(np.any(self.know_up & self.has_force) or np.any(self.know_axis & (self.rate != 0.0)))
+
 
 def side_by_side(sections: Sequence[Section]) -> SectionArrays:
     """The sections in arrays."""

@@ -129,11 +129,13 @@ def _orientations(record: Record, row: SectionRow) -> list[SectionRow]:
 
 
 def _of_turns(records: Mapping[str, Record], options: KnownTurnsSettings) -> Proposal:
-    """A turn about each axis, with the rests at its ends; each file is a session with a bias of its own."""
+    """A turn about each axis, with the rests at its ends. Each has a bias of its own, whose scatter the data tell: the
+    unit stands on another side in each, so that g-sensitivity alone changes it, in one file as in three."""
     rows = [
         replace(
             row,
             section=f"turn about {axis}",
+            session=f"turn about {axis}",
             kind="turn",
             axis=direction_of(axis, axis),
             angle=quantity_of(angle, u, "deg"),
@@ -150,7 +152,7 @@ def _of_turns(records: Mapping[str, Record], options: KnownTurnsSettings) -> Pro
 def _turn_files(records: Mapping[str, Record]) -> list[SectionRow]:
     """The stretch of the turn about x, y and z: a file each, or what has its label in one."""
     if len(records) == 3:
-        return [SectionRow("", name, session=name) for name in records]
+        return [SectionRow("", name) for name in records]
     if len(records) != 1:
         found = f"found {len(records)} files for three turns"
         raise StudyError("imu.turns", f"{found}, expected three, about x, y and z, or one with labels")

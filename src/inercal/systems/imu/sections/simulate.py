@@ -27,6 +27,7 @@ from inercal.systems.imu.simulate import (
     draw_truth,
     indicated,
     record_of_counts,
+    trembling,
     wandering_noise,
 )
 
@@ -67,7 +68,10 @@ def simulate_sections(
     if len(shifts) < 2:
         shifts = {name: np.zeros(6) for name in shifts}
     felt, turning, added, labels = [], [], [], list[str]()
-    for piece, q, w, change in sampled(pieces, of.sample_rate):
+    tremble = settings.disturbances.restless_start
+    for number, (piece, q, w, change) in enumerate(sampled(pieces, of.sample_rate)):
+        if tremble > 0.0 and number == 0:
+            q, w = trembling(q[0], len(q), of.sample_rate, tremble, rng)
         to_body = conjugate(q)
         force = rotate(to_body, np.array([0.0, 0.0, gravity])) if piece.force is None else piece.force
         felt.append(force + np.cross(w, np.cross(w, arm)) + np.cross(change, arm))

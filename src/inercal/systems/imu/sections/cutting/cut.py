@@ -184,6 +184,8 @@ def section_of(row: SectionRow) -> Section:
         rate_group=row.rate_group,
         angle=0.0 if row.angle is None else row.angle.value,
         angle_u=0.0 if row.angle is None else row.angle.u,
+        north=row.north,
+        north_u=FINDING.heading_u if row.north_u is None else row.north_u,
         setup=row.setup,
         session=row.session,
         scatter=row.scatter,

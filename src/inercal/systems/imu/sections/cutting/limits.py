@@ -117,6 +117,9 @@ class Limits:
     """Change of the noise from short to long means, over its u by chance, from which short ones say nothing of long
     ones."""
 
+    heading_u: float = math.radians(2.0)
+    """Standard uncertainty [rad] of the north of a section that states none."""
+
     side: float = math.radians(20.0)
     """Angle [rad] from an axis within which a rest may be a side; and two sides within it are one taken twice."""
 

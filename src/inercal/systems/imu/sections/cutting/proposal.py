@@ -62,11 +62,7 @@ class Proposal:
         """
         means = means or {}
         files = [RecordedTriads.of(name, record) for name, record in records.items()]
-        tables = {
-            file.name: Means(_values(file.acc), _values(file.gyro))
-            for file in files
-            if is_counted(file.record)
-        } | dict(means)
+        tables = {file.name: _means(file) for file in files if is_counted(file.record)} | dict(means)
         told: list[SectionRow] = []
         questions: list[Finding] = []
         for file in files:
@@ -115,7 +111,7 @@ class Proposal:
         for name, file in files.items():
             if is_counted(file.record):
                 mine = [row for row in rows if row.file == name]
-                table = Means(_values(file.acc), _values(file.gyro))
+                table = _means(file)
                 count = len(next(iter(file.record.columns.values())).values)
                 if len(mine) != count:
                     raise StudyError(
@@ -353,6 +349,21 @@ def _samples(record: Record, sensor: str) -> TriadSamples | None:
 def _values(samples: TriadSamples | None) -> np.ndarray | None:
     """The outputs (n, 3) of a triad."""
     return None if samples is None else samples.values
+
+
+def _means(file: RecordedTriads) -> Means:
+    """The rows of means of a file, with what it says of their noise and of specific force."""
+    record = file.record
+
+    def beside(head: str) -> np.ndarray | None:
+        names = [f"{head}_{axis}" for axis in "xyz"]
+        if not all(name in record for name in names):
+            return None
+        return np.stack(
+            [record[name].si() if head == "up" else record[name].values for name in names], axis=1
+        )
+
+    return Means(_values(file.acc), _values(file.gyro), beside("u_acc"), beside("u_gyro"), beside("up"))
 
 
 def _scale(record: Record) -> float | None:

@@ -26,7 +26,8 @@ RowKind = Literal[Kind, "move", "swing"]
 
 _DIMENSIONS = {
     "begin": ("time", "s"), "end": ("time", "s"), "rate": ("rate", "deg/s"), "angle": ("angle", "deg"),
-    "placing": ("angle", "deg"), "level": ("angle", "deg"), "temperature": ("temperature", "degC"),
+    "placing": ("angle", "deg"), "level": ("angle", "deg"), "north_u": ("angle", "deg"),
+    "temperature": ("temperature", "degC"),
 }  # fmt: skip
 _LETTERS = "xyz"
 _KELVIN = parse_unit("K")
@@ -64,6 +65,10 @@ class SectionRow:
     """Standard uncertainty of up and axis, in either direction across; blank: that of the study, else found."""
     level: float | None = None
     """The axis is vertical within this."""
+    north: Array | None = None
+    """Axis of the case that points north, such as +y, or three numbers; blank: not known."""
+    north_u: float | None = None
+    """Standard uncertainty of this heading; blank: 2 deg."""
     setup: str = ""
     """Word that sections share between which nobody touched the unit: they share its placing."""
     session: str = ""
@@ -180,7 +185,7 @@ def _value(name: str, text: str, where: str) -> object:
         if text not in kinds:
             raise StudyError(where, f"found {shown(text)}, expected one of {', '.join(kinds)}")
         return text
-    if name in ("up", "axis"):
+    if name in ("up", "axis", "north"):
         return direction_of(text, where)
     if name == "force":
         return _force(text, where)
@@ -244,7 +249,7 @@ def _fitting(row: SectionRow, where: str) -> None:
             raise StudyError(
                 f"{where}{name}", f"found one for a section of kind {row.kind}, expected kind {kind}"
             )
-    for name in ("placing", "level"):
+    for name in ("placing", "level", "north_u"):
         if (getattr(row, name) or 0.0) < 0.0:
             raise StudyError(f"{where}{name}", "found a negative uncertainty, expected 0 deg or more")
 
@@ -271,7 +276,7 @@ def _cell(row: SectionRow, name: str) -> str:
     value = getattr(row, name)
     if value is None or isinstance(value, str):
         return value or ""
-    if name in ("up", "axis"):
+    if name in ("up", "axis", "north"):
         return side_of(value) or " ".join(f"{number:.9g}" for number in value)
     if name == "force":
         return " ".join(value) if isinstance(value, tuple) else f"{' '.join(f'{f:.9g}' for f in value)} m/s^2"

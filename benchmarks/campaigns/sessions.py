@@ -1,4 +1,4 @@
-"""A simulated Ferraris session: six positions and three turns by an instrument of known truth."""
+"""A simulated Ferraris session with pauses, changes of heading and its own clock, for campaigns and tests."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from inercal.foundation.geometry.rotations import conjugate, exp, log, multiply,
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.record import Record
 from inercal.systems.imu.ferraris.names import POSITIONS, TERMS_OF_FERRARIS, TURNS, UP
-from inercal.systems.imu.settings import Disturbances, FerrarisSettings, ImuSettings
+from inercal.systems.imu.settings import Disturbances
 from inercal.systems.imu.simulate import (
     ImuTruth,
     TriadNoise,
-    as_stated,
-    draw_full_truth,
     indicated,
     record_of_counts,
     trembling,
@@ -55,8 +53,6 @@ class SessionCourse:
 def true_values(truth: ImuTruth) -> Array:
     """The coefficients (33,) in the order of `TERMS_OF_FERRARIS`."""
     values = truth.values()
-    M = truth.accelerometer.misalignment
-    values |= {f"M_{i}{j}": float(M["xyz".index(i), "xyz".index(j)]) for i, j in ("yx", "zx", "zy")}
     return np.array([values[name] for name in TERMS_OF_FERRARIS])
 
 
@@ -190,21 +186,3 @@ def _motion(start: Array, step: Array, length: float, rate: float) -> tuple[Arra
 def quiet(truth: ImuTruth) -> ImuTruth:
     """The same instrument without noise."""
     return replace(truth, accelerometer_noise=TriadNoise(0.0), gyro_noise=TriadNoise(0.0))
-
-
-def simulate_study(settings: ImuSettings, options: FerrarisSettings, rng: np.random.Generator) -> Record:
-    """The session of a study; directions and turns are off by the uncertainties that it states."""
-    of, site = settings.simulation, settings.site
-    truth = as_stated(draw_full_truth(rng), of)
-    session = SessionCourse(
-        holds=(of.hold,) * 6,
-        turn=options.turn,
-        turning=of.turning,
-        rate=of.sample_rate,
-        alignment=options.alignment or 0.0,
-        turn_u=options.turn_u,
-        gravity=site.gravity,
-        latitude=site.latitude,
-        clock=1.0 + settings.disturbances.clock,
-    )
-    return simulate_session(truth, session, rng, settings.disturbances)[0]
