@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -100,6 +101,21 @@ def recognised(
         return None
     data = tomllib.loads(guess_map(paths, on_table, of_model, answers=answers))
     return map_of(data, paths[0], written=False) if data else None
+
+
+def map_for(
+    paths: Sequence[Path], written: RecordMap | None, answers: Mapping[str, str], how: Mapping[str, Any]
+) -> RecordMap | None:
+    """The map that files are read by: the one that is ``written``, with the answers, else what is recognised; None of
+    files that say themselves what they hold. ``how`` columns are recognised: options of `recognised`.
+
+    Raises `MapError` and `RecordError`; guesses are still in it.
+    """
+    if written is not None:
+        return written.answered(answers)
+    if not answers and (not paths or canonical_units(paths) is not None):
+        return None
+    return recognised(paths, answers, **how)
 
 
 def _answered(file: FileGuess, answers: Mapping[str, str]) -> FileGuess:
