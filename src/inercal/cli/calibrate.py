@@ -59,15 +59,18 @@ def calibrate_imu(
     if study is not None:
         return _calibrated("imu", files, study, map_file, span, keys, output)
     from inercal.faces.python.beginning import study_for
+    from inercal.systems.listed import SYSTEMS
 
     output.check(WHOLE, (*files, map_file))
     if not any(key.strip().startswith("site.") for key in keys):
         raise InputError("--latitude", 'missing, expected it where there is no --study, such as "48 deg"')
     clock = time.perf_counter()
-    records = read_repeats(files, map_file, output, span, counted=True)
+    needs_gyro = partial(SYSTEMS["imu"].needs_gyro, None)
+    records = read_repeats(files, map_file, output, span, counted=True, needs_gyro=needs_gyro)
     the_study, told = study_for("imu", records, keys)
     if not the_study.system.counted(the_study.settings):
-        records = read_repeats(files, map_file, replace(output, quiet=True), span)
+        quiet = replace(output, quiet=True)
+        records = read_repeats(files, map_file, quiet, span, needs_gyro=needs_gyro)
     read_s = time.perf_counter() - clock
     output.say(f"study: {told}; `inercal new imu` writes one to change")
     return _solved(the_study, records, output, read_s)
@@ -144,7 +147,8 @@ def _calibrated(
     if system.sections is not None:  # the table of sections is no recording, though `*.csv` takes it in
         tables = {path.resolve() for path in the_study.files} - {study.resolve()}
         files = [file for file in files if file.resolve() not in tables]
-    records = read_repeats(files, map_file, output, span, system.counted(the_study.settings), system.guess)
+    counted, needs_gyro = system.counted(the_study.settings), partial(system.needs_gyro, the_study.settings)
+    records = read_repeats(files, map_file, output, span, counted, system.guess, needs_gyro)
     return _solved(the_study, records, output, time.perf_counter() - clock)
 
 

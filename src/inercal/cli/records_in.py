@@ -95,7 +95,9 @@ def read_record(
 
     span.check()
     record_map = map_of_files(files, map_file, span, with_guess=with_guess)
-    return _read(lambda *given: [read(*given)], files, record_map, output, span)[0]
+    (record,) = _read(lambda *given: [read(*given)], files, record_map, output, span)
+    _say_taken(record_map, record, output)
+    return record
 
 
 def read_repeats(
@@ -105,17 +107,30 @@ def read_repeats(
     span: Span = Span(),
     counted: bool = False,
     how: Mapping[str, Any] | None = None,
+    needs_gyro: Callable[[Sequence[Record]], bool] = lambda records: True,
 ) -> list[Record]:
     """As `read_record`, but files with the same channels are the records of repeat runs.
 
     ``counted``: rows need no times, as means of poses. ``how`` columns are recognised: options of
-    `inercal.foundation.records.recognise.map_text.recognised`.
+    `inercal.foundation.records.recognise.map_text.recognised`. A gyro that is a guess is left aside where the task does
+    without it, as ``needs_gyro`` says of the records.
     """
     from inercal.foundation.records.read import read_runs
 
     span.check()
-    record_map = map_of_files(files, map_file, span, how)
-    return _read(partial(read_runs, counted=counted), files, record_map, output, span)
+    record_map = map_of_files(files, map_file, span, how, with_guess=True)
+    if record_map is not None:
+        record_map.refuse_guess(spare=("gyro",))
+    records = _read(partial(read_runs, counted=counted), files, record_map, output, span)
+    if record_map is not None and record_map.guessed:
+        if needs_gyro(records):
+            record_map.refuse_guess()
+        records = [record.without("gyro") for record in records]
+        output.say(
+            "gyro: left aside, for nothing tells its unit and no section turns; its biases need --answer"
+        )
+    _say_taken(record_map, records[0], output)
+    return records
 
 
 def _read(
@@ -125,14 +140,18 @@ def _read(
     output: FileOutput,
     span: Span,
 ) -> list[Record]:
-    """Records by one of the readers, and the part of each that is asked for; says what was taken for what."""
+    """Records by one of the readers, and the part of each that is asked for."""
     with reading(output) as progress:
         records = read(files, record_map, progress)
-    if record_map is not None and not record_map.written:
-        for sensor, words in record_map.taken.items():
-            output.say(f"{sensor}: {words}")
     output.spare(source.path for record in records for source in record.sources)
     return [span.of(record) for record in records]
+
+
+def _say_taken(record_map: RecordMap | None, record: Record, output: FileOutput) -> None:
+    """Say what was recognised, where no map was written."""
+    if record_map is not None and not record_map.written:
+        for sensor, words in record.taken.items():
+            output.say(f"{sensor}: {words}")
 
 
 def map_in(map_file: Path | None, answers: Sequence[str] = (), with_guess: bool = False) -> RecordMap | None:
@@ -167,12 +186,10 @@ def map_of_files(
 
     if not span.answers and (not files or canonical_units(files) is not None):
         return None
-    from inercal.foundation.records.maps import answers_of
-    from inercal.foundation.records.recognise.map_text import (
-        recognised,  # slow to load, for it brings a checker
-    )
+    from inercal.foundation.records.maps import answers_of  # slow to load, for it brings a checker
+    from inercal.foundation.records.recognise.map_text import map_for
 
-    record_map = recognised(files, answers_of(span.answers or ()), **(how or {}))
+    record_map = map_for(files, None, answers_of(span.answers or ()), how or {})
     if record_map is not None and not with_guess:
         record_map.refuse_guess()
     return record_map

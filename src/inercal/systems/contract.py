@@ -99,6 +99,8 @@ class System:
     """Options of `inercal.foundation.records.recognise.map_text.guess_map`."""
     counted: Callable[[Any], bool] = lambda settings: False
     """True of settings for which rows of a file need no times."""
+    needs_gyro: Callable[[Any, Sequence[Record]], bool] = lambda settings, records: True
+    """False where settings (None of a new study) ask nothing of the records that only a gyro could tell."""
 
     # verbs
     calibrate: Callable[[Sequence[Record], Study, bool, Say], Result]

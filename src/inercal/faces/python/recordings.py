@@ -37,6 +37,7 @@ def read(
     paths: str | Path | Sequence[str | Path],
     map: str | Path | RecordMap | None = None,
     *,
+    answers: Mapping[str, str] | None = None,
     begin: str | float | None = None,
     end: str | float | None = None,
     counted: bool = False,
@@ -49,8 +50,10 @@ def read(
         Files with distinct channels are parts of one record; each keeps its own time axis, unless the stamps are
         equal.
     map : path or RecordMap, optional
-        Map from columns to channels; not needed for files that say so themselves, as by a header
-        ``t [s],acc_x [m/s^2]``.
+        Map from columns to channels. Without one columns are recognised, where the files do not say themselves what
+        they hold; ``taken`` of the record has what was taken, and why.
+    answers : mapping of str to str, optional
+        Answers to what neither tells, such as ``{"gyro": "deg/s", "rate": "95 Hz"}``, as of ``--answer``.
     begin, end : str, float or None
         Part of the recording, from the first stamp of each clock: ``"12.5 s"``, or seconds.
     counted : bool
@@ -64,7 +67,8 @@ def read(
     Raises
     ------
     InputError
-        A file that cannot be read, a map that does not fit it, or no rows from ``begin`` to ``end``.
+        A file that cannot be read, a map that does not fit it, a guess that nobody answered, or no rows from ``begin``
+        to ``end``.
 
     Examples
     --------
@@ -76,7 +80,24 @@ def read(
     """
     from inercal.foundation.records.read import read as read_files
 
-    return read_files(paths, map, counted=counted).between(begin, end)
+    return read_files(paths, _map_for(paths, map, answers), counted=counted).between(begin, end)
+
+
+def _map_for(
+    paths: str | Path | Sequence[str | Path],
+    given: str | Path | RecordMap | None,
+    answers: Mapping[str, str] | None = None,
+) -> RecordMap | None:
+    """The map that files are read by; raises `InputError`, also for one with a guess."""
+    from inercal.foundation.records.maps import read_map
+    from inercal.foundation.records.recognise.map_text import map_for
+
+    files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    written = read_map(given) if isinstance(given, str | Path) else given
+    record_map = map_for(files, written, answers or {}, {})
+    if record_map is not None:
+        record_map.refuse_guess()
+    return record_map
 
 
 def repeats(paths: Sequence[str | Path], study: Study, map: str | Path | None = None) -> list[Record]:
@@ -86,7 +107,7 @@ def repeats(paths: Sequence[str | Path], study: Study, map: str | Path | None = 
     """
     from inercal.foundation.records.read import read_runs
 
-    return read_runs(paths, map, counted=study.system.counted(study.settings))
+    return read_runs(paths, _map_for(paths, map), counted=study.system.counted(study.settings))
 
 
 def record(

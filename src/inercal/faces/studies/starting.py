@@ -153,8 +153,45 @@ def strapdown_study() -> dict[str, Any]:
     return _keys(_STRAPDOWN)
 
 
+_TILT_TEST = (
+    _COMMON
+    + """
+[rig]
+kind = "chain"
+chain = [{ joint = "phi1", axis = "y" }]
+[instrument]
+kind = "accelerometer"
+"""
+)
+
+_RATE_TEST = (
+    _COMMON
+    + """
+[rig]
+kind = "chain"
+chain = [{ joint = "phi1", axis = "z" }]
+[instrument]
+kind = "gyro"
+[rate_test]
+joint = "phi1"
+"""
+)
+
+
 def turntable_study(channels: Collection[str]) -> dict[str, Any]:
-    """Keys of a new study of a turntable: of a rate test where the channels of the recording have a rate."""
+    """Keys of a new study of a turntable: of a rate test where the channels of the recording have a rate.
+
+    A recording of rates alone is of a table with one axis, z; of one angle and accelerometers alone, of one that tilts
+    about y.
+    """
+    angles = {"phi1", "phi2", "phi3"} & set(channels)
+    if "rate" in channels and not angles:
+        return _keys(_RATE_TEST)
+    tilted = [channel[-1] for channel in channels if channel in ("acc_x", "acc_z")]
+    if angles == {"phi1"} and tilted and "rate" not in channels:
+        keys = _keys(_TILT_TEST)
+        keys["instrument"]["terms"] = [f"{term}_{axis}" for axis in tilted for term in ("K0", "K1")]
+        return keys
     return _keys(_TURNTABLE) | ({"rate_test": {}} if "rate" in channels else {})
 
 

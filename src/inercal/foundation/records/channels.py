@@ -107,6 +107,11 @@ def of_a_table(names: Iterable[str]) -> bool:
     return any(re.fullmatch(r"position|phi[123]|rate", name) for name in names)
 
 
+def measures_motion(name: str) -> bool:
+    """True for channels that measure motion."""
+    return re.fullmatch(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]", name) is not None
+
+
 def nearest(name: str) -> str:
     """Advice for an unknown name: the nearest known one, or all of them."""
     near = difflib.get_close_matches(name[:80], _EXAMPLES, n=1, cutoff=0.5)

@@ -66,5 +66,23 @@ class Limits:
     coarse_noise: float = 0.6
     """Standard deviation of an output at rest, over its step, below which its noise is not known."""
 
+    sphere_scatter: float = 0.03
+    """Scatter about a sphere, over its radius, up to which a triad lies on it."""
+
+    sphere_moment: float = 0.05
+    """Least moment of the directions on a sphere, of 1 in all, from which they point all around."""
+
+    sphere_mean: float = 0.7
+    """Length of the mean direction on a sphere up to which they do."""
+
+    sphere_rows: int = 10
+    """Rows on a sphere at least."""
+
+    seen_rate_low: float = 0.85
+    """Turns that a gyro shows, over those that accelerometers see, below which its unit is contradicted."""
+
+    seen_rate_high: float = 1.18
+    """Turns that a gyro shows, over those that accelerometers see, above which its unit is contradicted."""
+
 
 LIMITS = Limits()

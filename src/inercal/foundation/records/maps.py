@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -171,11 +171,17 @@ class RecordMap:
         )
         return replace(self, parts=parts, rate=rate, rate_u=rate_u)
 
-    def refuse_guess(self) -> None:
-        """Refuse a map with a guess, by its question and how to answer it; raises `MapError`."""
+    @property
+    def guessed(self) -> set[str]:
+        """The sensors whose entries are guesses."""
+        return {channel.sensor for channel in self.channels if channel.grade == "guess"}
+
+    def refuse_guess(self, spare: Collection[str] = ()) -> None:
+        """Refuse a map with a guess, but for sensors to ``spare``, by its question and how to answer it; raises
+        `MapError`."""
         for part in self.parts:
             for channel in part.channels or ():
-                if channel.grade == "guess":
+                if channel.grade == "guess" and channel.sensor not in spare:
                     table = f"file.{part.name}.columns" if part.name else "columns"
                     asked = channel.question or f"Is the unit of {channel.name} {channel.unit.symbol}?"
                     answer = f"{channel.sensor}={channel.unit.symbol}"

@@ -82,6 +82,14 @@ class Record:
                 )
         return Triad(sensor, x.unit, x.t, np.stack([x.values, y.values, z.values], axis=-1), x.source)
 
+    def without(self, sensor: str) -> Record:
+        """The record without the channels of a sensor, and without findings on them."""
+        kept = {name: column for name, column in self.columns.items() if column.sensor != sensor}
+        taken = {name: words for name, words in self.taken.items() if name != sensor}
+        of_it = tuple(f"{name}:" for name in self.columns if name not in kept)
+        findings = tuple(found for found in self.findings if not found.headline.startswith(of_it))
+        return replace(self, columns=kept, taken=taken, findings=findings)
+
     def between(self, begin: str | float | None = None, end: str | float | None = None) -> Record:
         """The part of the record from ``begin`` to ``end``, both from the first stamp of each clock.
 

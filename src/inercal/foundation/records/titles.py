@@ -172,6 +172,11 @@ def fits(name: str, unit: str) -> bool:
     return parsed is not None and misfit(name, parsed) is None
 
 
+def is_unit(text: str) -> bool:
+    """True for the unit of any quantity."""
+    return _known(text) is not None
+
+
 def _known(unit: str) -> Unit | None:
     """The unit, None if there is none such."""
     try:

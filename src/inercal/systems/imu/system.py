@@ -51,6 +51,12 @@ def _counted(settings: ImuSettings) -> bool:
     return in_rows(settings)
 
 
+def _needs_gyro(settings: ImuSettings | None, records: Sequence[Record]) -> bool:
+    from inercal.systems.imu.sections.beginning import needs_gyro
+
+    return needs_gyro(settings, records)
+
+
 def _calibrate(
     records: Sequence[Record], study: Study, compare: bool, progress: Callable[[str], None]
 ) -> Result:
@@ -95,6 +101,7 @@ SYSTEM = System(
     first="calibrate imu {files}",
     table="imu",
     counted=_counted,
+    needs_gyro=_needs_gyro,
     calibrate=_calibrate,
     simulate=_simulate,
     designs={"sections": OfferedDesign(_design)},

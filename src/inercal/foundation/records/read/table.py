@@ -11,7 +11,7 @@ from typing import Protocol
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
-from inercal.foundation.records.channels import Channel
+from inercal.foundation.records.channels import Channel, Origin
 from inercal.foundation.records.frames import Frame
 
 LARGEST = 1e30
@@ -100,6 +100,13 @@ class FirstLook:
     def times_named(self) -> Counter[str]:
         """Counts of the names in the header; empty where none is a name."""
         return Counter(self.names) if any(self.names) else Counter()
+
+    def origin(self, index: int) -> Origin:
+        """The name of a column in a map."""
+        if self.times_named:
+            alone = not self.numbered and self.times_named[self.names[index]] == 1
+            return self.names[index] if alone else index
+        return (self.variable, index) if self.variable else index
 
 
 class Reader(Protocol):

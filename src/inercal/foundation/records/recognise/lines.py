@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from inercal.foundation.errors import QuantityError
 from inercal.foundation.records.recognise.words import unit_of
-from inercal.foundation.units import parse_unit
+from inercal.foundation.records.titles import is_unit
 
 _SAMPLE = 100
 _LOOKED_AT = 400
@@ -122,17 +121,8 @@ def row_of_units(cells: Sequence[str]) -> tuple[str | None, ...] | None:
     None for the row if fewer than two thirds of its cells but the first are units.
     """
     bare = [cell.strip("[]() ") for cell in cells]
-    units = [unit_of(cell) or (cell if len(cell) > 1 and _is_unit(cell) else None) for cell in bare]
+    units = [unit_of(cell) or (cell if len(cell) > 1 and is_unit(cell) else None) for cell in bare]
     filled = [unit for cell, unit in zip(bare[1:], units[1:], strict=True) if cell]
     if not filled or 3 * sum(unit is not None for unit in filled) < 2 * len(filled):
         return None
     return tuple(units)
-
-
-def _is_unit(text: str) -> bool:
-    """True for a unit of any quantity."""
-    try:
-        parse_unit(text)
-    except QuantityError:
-        return False
-    return True

@@ -7,17 +7,18 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from inercal.foundation.errors import RecordError
-from inercal.foundation.records.channels import Origin, of_a_table, sensor_and_axis
+from inercal.foundation.errors import InputError, RecordError
+from inercal.foundation.records.channels import Origin, measures_motion, of_a_table, sensor_and_axis
 from inercal.foundation.records.maps import ASIDE, OPEN, RecordMap, check_answers, map_of
 from inercal.foundation.records.read import canonical_units
-from inercal.foundation.records.recognise.tables import MEASURED, FileGuess, look, origin_of, samples_of
+from inercal.foundation.records.recognise.tables import FileGuess, look, samples_of
 from inercal.foundation.records.recognise.units import EVERYDAY, quoted, units_of
-from inercal.foundation.records.titles import fits
-from inercal.foundation.units import parse_quantity
+from inercal.foundation.records.titles import fits, is_unit
+from inercal.foundation.units import parse_quantity, shown
 
 _RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 
@@ -47,14 +48,21 @@ def guess_map(
     answers = answers or {}
     rate = answers.get("rate", rate)
     hertz = None if rate is None else parse_quantity(rate, "frequency", "rate").value
+    chosen = {name: answer for name, answer in answers.items() if name != "rate" and not is_unit(answer)}
     for path in [paths] if isinstance(paths, str | Path) else paths:
-        looked = look(Path(path), on_table, of_model, hertz)
+        looked = look(Path(path), on_table, of_model, hertz, chosen)
         if not any(looked[0].guesses.keys() & other.guesses.keys() - {"t"} for other in files):
             files += looked
     names_there = {name for file in files for name in file.guesses}
     check_answers(answers, names_there | {sensor_and_axis(name)[0] for name in names_there})
+    for name, title in chosen.items():
+        if title != ASIDE and not any(title in file.titles for file in files):
+            raise InputError(
+                "--answer", f"{name}: found {shown(title)}, expected a unit, {ASIDE}, or the name of a column"
+            )
+    answers = {name: answer for name, answer in answers.items() if name not in chosen or answer == ASIDE}
     files = [_answered(file, answers) for file in files]
-    if not any(MEASURED.fullmatch(name) for file in files for name in file.guesses):
+    if not any(measures_motion(name) for file in files for name in file.guesses):
         return _skeleton(
             files, "phi1 phi2 acc_x" if on_table else "a1 a2 gyro" if of_model else "acc_x acc_y gyro_x"
         )
@@ -95,6 +103,21 @@ def recognised(
     return map_of(data, paths[0], written=False) if data else None
 
 
+def map_for(
+    paths: Sequence[Path], written: RecordMap | None, answers: Mapping[str, str], how: Mapping[str, Any]
+) -> RecordMap | None:
+    """The map that files are read by: the one that is ``written``, with the answers, else what is recognised; None of
+    files that say themselves what they hold. ``how`` columns are recognised: options of `recognised`.
+
+    Raises `MapError` and `RecordError`; guesses are still in it.
+    """
+    if written is not None:
+        return written.answered(answers)
+    if not answers and (not paths or canonical_units(paths) is not None):
+        return None
+    return recognised(paths, answers, **how)
+
+
 def _answered(file: FileGuess, answers: Mapping[str, str]) -> FileGuess:
     """The file without the channels that are left aside."""
     aside = [name for name, answer in answers.items() if answer == ASIDE]
@@ -108,7 +131,7 @@ def _answered(file: FileGuess, answers: Mapping[str, str]) -> FileGuess:
 def columns_of(path: Path) -> tuple[Origin, ...]:
     """The columns of a file in their order, as a map names them; raises `RecordError` where it cannot be read."""
     return tuple(
-        origin_of(sample, index) for sample in samples_of(path) for index in range(sample.values.shape[1])
+        sample.origin(index) for sample in samples_of(path) for index in range(sample.values.shape[1])
     )
 
 
@@ -118,6 +141,7 @@ def _skeleton(files: Sequence[FileGuess], names: str) -> str:
     unit = next(unit for unit in EVERYDAY[1:] if fits(first, unit))
     lines = ["# No accelerometer or gyro was recognised. Give each channel its column and unit, for example"]
     lines += [f"# [columns.{first}]", "# from = 1", f"# unit = {quoted(unit)}", "#"]
+    lines[1:1] = [f"# {file.known}." for file in files if file.known]
     lines += [f"# and likewise t, {', '.join(others)}. Without a time column, state the rate:"]
     lines += ["# [time]", '# rate = "100 Hz"', "#", "# What there is, with the first numbers:"]
     for file in files:
@@ -140,6 +164,8 @@ def _columns(file: FileGuess, table: str, answers: Mapping[str, str]) -> list[st
         origin = list(guess.origin) if isinstance(guess.origin, tuple) else guess.origin
         lines += [f"[{table}.{name}]", f"from = {quoted(origin)}"]
         lines += [] if name == "label" else [f"unit = {quoted(found.unit)}"]
+        lines += ["sign = -1"] if guess.factor < 0.0 else []
+        lines += [] if abs(guess.factor) == 1.0 else [f"scale = {abs(guess.factor)!r}"]
         lines += [f"grade = {quoted(found.grade)}", f"because = {quoted(because)}"]
         lines += [f"question = {quoted(found.question)}"] if found.question else []
     return lines

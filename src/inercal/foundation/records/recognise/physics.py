@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.records.limits import LIMITS
 
 G0 = 9.80665
 """Standard gravity [m/s^2]."""
@@ -75,6 +76,53 @@ def gravity_unit(triad: Array) -> str:
     near = (("m/s^2", G0), ("g", 1.0), ("cm/s^2", 980.665), ("mg", 1000.0))
     unit, size = min(near, key=lambda each: abs(norm / each[1] - 1.0))
     return unit if abs(norm / size - 1.0) < 0.04 else ""
+
+
+@dataclass(frozen=True)
+class FreeSphere:
+    """A sphere on which a triad lies: its ``centre`` (3,), its ``radius``, and the ``scatter`` about it, relative."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    scatter: float
+
+
+def sphere(triad: Array) -> FreeSphere | None:
+    """The sphere, its centre free, on which the rows of a triad (n, 3) lie that point all around; None of others.
+
+    Rows far off, as those in motion, are left out: they are a third at most. What stays put lies on none.
+    """
+    rows = np.unique(triad[np.isfinite(triad).all(axis=1)], axis=0)
+    rows = rows[:: max(1, len(rows) // _MOST)]
+    if len(rows) < LIMITS.sphere_rows:
+        return None
+    middle, size = np.median(rows, axis=0), float(np.std(rows))
+    if not size > 0.0:
+        return None
+    scaled = (rows - middle) / size
+    used = np.ones(len(scaled), dtype=bool)
+    for _ in range(4):
+        design = np.column_stack([2.0 * scaled[used], np.ones(used.sum())])
+        found = np.linalg.lstsq(design, (scaled[used] ** 2).sum(axis=1), rcond=None)[0]
+        square = float(found[3] + found[:3] @ found[:3])
+        if not square > 0.0:
+            return None
+        radius = np.sqrt(square)
+        away = np.linalg.norm(scaled - found[:3], axis=1) / radius - 1.0
+        scatter = float(np.median(np.abs(away[used])))
+        used = np.abs(away) < max(6.0 * scatter, 1e-6)
+        if used.sum() < max(LIMITS.sphere_rows, 2 * len(rows) // 3):
+            return None
+    directions = (scaled[used] - found[:3]) / radius
+    around = float(np.linalg.eigvalsh(directions.T @ directions / len(directions))[0])
+    if (
+        scatter > LIMITS.sphere_scatter
+        or around < LIMITS.sphere_moment
+        or np.linalg.norm(directions.mean(axis=0)) > LIMITS.sphere_mean
+    ):
+        return None
+    centre = middle + size * found[:3]
+    return FreeSphere(tuple(centre.tolist()), size * float(radius), scatter)
 
 
 @dataclass(frozen=True)

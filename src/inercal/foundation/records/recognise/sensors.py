@@ -1,75 +1,79 @@
-"""Which columns are accelerometers and gyros, in which units, how sure that is and why: words first, then physics."""
+"""Which columns are accelerometers and gyros, how sure that is and why: words first, then physics."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.recognise.physics import (
-    G0,
-    SIZES,
     SeenTurns,
     gravity_unit,
     is_direction,
-    is_whole,
-    lattice_unit,
-    norm_of,
+    sphere,
     turns,
 )
+from inercal.foundation.records.recognise.sensor_units import (
+    SensorFound,
+    TriadOfColumns,
+    may_be,
+    with_acc_unit,
+    with_gyro_unit,
+)
 from inercal.foundation.records.recognise.units import quoted
-from inercal.foundation.records.recognise.words import MEASURED, Said, said, sensors_named, words_of
+from inercal.foundation.records.recognise.words import (
+    MEASURED,
+    Said,
+    device_of,
+    is_one_of_several,
+    said,
+    sensors_named,
+    words_of,
+)
+from inercal.foundation.records.titles import triads_by_name
 
-_FULL_SCALE = 2100.0  # deg/s
-
-
-@dataclass(frozen=True)
-class SensorFound:
-    """Three columns of a table, in the order x, y, z, taken for a sensor (``acc`` or ``gyro``), or ``up``, what is
-    known of specific force.
-
-    ``grade`` is ``certain`` (words for the sensor and words or physics for the unit), ``likely`` (physics alone, one
-    reading) or ``guess``, which has a ``question``; ``reason`` says why in one line.
-    """
-
-    sensor: str
-    columns: tuple[int, int, int]
-    units: tuple[str, str, str]
-    grade: str
-    reason: str
-    question: str = ""
-
-
-@dataclass(frozen=True)
-class _Named:
-    """A triad by the names of its columns."""
-
-    sensor: str
-    columns: tuple[int, int, int]
-    said: tuple[Said, Said, Said]
-    reason: str
+Units = Sequence[str | None]
 
 
 def sensors(
-    names: Sequence[str], units: Sequence[str | None], values: Array, t: Array | None, file: str
+    names: Sequence[str],
+    units: Units,
+    values: Array,
+    t: Array | None,
+    file: str,
+    called: Sequence[str],
+    chosen: Mapping[str, str],
 ) -> list[SensorFound]:
     """The accelerometers and gyros among named columns.
 
-    ``values`` (n, k) are the columns, ``names`` (k,) and ``units`` (k,) what is written above them, ``t`` (n,) [s]
-    the times or None, ``file`` the name of the file, which speaks where it names one sensor and there is one triad.
+    ``values`` (n, k) are the columns, ``names`` (k,) and ``units`` (k,) what is written above them, ``called`` (k,) the
+    names as their count tells them, ``t`` (n,) [s] the times or None, ``file`` the name of the file, which speaks where
+    it names one sensor and there is one triad; ``chosen`` the name of the first column by sensor, where that was asked.
     """
     if not any(names):
         return _nameless(values, t, file)
     units = units or (None,) * len(names)
-    triads = _by_name(names, units, values, file)
-    acc = _accelerometer(triads, values)
-    found = [] if acc is None else [_with_acc_unit(acc, values)]
-    gyro, seen = _gyro(triads, acc, values, t)
+    triads = _by_name(names, called, units, values, file)
+    pairs = _in_pairs(triads, names, chosen)
+    acc = _accelerometer(triads, values, pairs)
+    found, rivals = _by_sphere(triads, values) if acc is None else ([with_acc_unit(acc, values)], [])
+    if acc is None and found:
+        acc = next(triad for triad in triads if triad.columns == found[0].columns)
+    gyro, seen = _gyro([triad for triad in triads if triad not in rivals], acc, values, t, pairs)
     if gyro is not None:
         beside_counts = any("count" in triad.units for triad in found)
-        found.append(_with_gyro_unit(gyro, seen, values, t is not None, beside_counts))
+        found.append(with_gyro_unit(gyro, seen, values, t is not None, beside_counts))
+    found = [_with_others(triad, triads, names) for triad in found]
+    devices = [] if chosen.keys() & {"acc", "gyro"} else _devices(triads)
+    if found and len(devices) > 1:
+        asked = (
+            f"Which of the devices {' and '.join(' '.join(device) for device in devices)} is meant? The first is "
+            f"taken; for another answer with the name of its first column, as {found[0].sensor}="
+            f"{_first_of(triads, found[0].sensor, devices[1], names)}."
+        )
+        found[0] = replace(found[0], grade="guess", question=asked)
     return [*found, *_known_force(names, units, values)]
 
 
@@ -95,13 +99,15 @@ def _known_force(names: Sequence[str], units: Sequence[str | None], values: Arra
     ]
 
 
-def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, file: str) -> list[_Named]:
+def _by_name(
+    names: Sequence[str], called: Sequence[str], units: Units, values: Array, file: str
+) -> list[TriadOfColumns]:
     """Columns whose names differ in their axis alone, but for those that no sensor bears."""
     groups: dict[tuple[str, str], dict[str, tuple[int, Said]]] = {}
-    for index, (name, unit) in enumerate(zip(names, units, strict=True)):
+    usable = [bool(np.isfinite(column).any()) for column in values.T]
+    for index, (name, unit) in enumerate(zip(called, units, strict=True)):
         words = said(name, unit)
-        usable = np.isfinite(values[:, index]).any() and words.axis and not words.never
-        if usable and words.sensor in ("", "acc", "gyro"):
+        if usable[index] and words.axis and not words.never and words.sensor in ("", "acc", "gyro"):
             groups.setdefault((words.sensor, words.stem), {}).setdefault(words.axis, (index, words))
     full = [(key[0], axes) for key, axes in groups.items() if len(axes) == 3]
     hints = sensors_named(file.rpartition(".")[0])
@@ -110,6 +116,18 @@ def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, f
         rates = {axis: _lone(letter, names, units) for axis, letter in zip("xyz", "pqr", strict=True)}
         rolls = {axis: rate for axis, rate in rates.items() if rate is not None}
         full += [("gyro", rolls)] if len(rolls) == 3 and any(sensor == "acc" for sensor, _ in full) else []
+    if full:
+        # three names that are alike but for x, y, z, though no word is known in them
+        taken = {index for _, axes in full for index, _ in axes.values()}
+        for alike in triads_by_name(called):
+            spoken = [said(called[index], units[index]) for index in alike]
+            plain = all(not word.never and word.sensor in ("", "t") and not word.axis for word in spoken)
+            if plain and not taken & set(alike) and all(usable[index] for index in alike):
+                axes = {
+                    axis: (column, replace(word, sensor="", axis=axis))
+                    for axis, column, word in zip(("x", "y", "z"), alike, spoken, strict=True)
+                }
+                full.append(("", axes))
     found = []
     for sensor, axes in full:
         x, y, z = (axes[axis] for axis in "xyz")
@@ -120,7 +138,7 @@ def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, f
         if not sensor and len(hints) == 1 and len(full) == 1:
             sensor, reason = hints[0], f"the file is called {quoted(file)}"
         if sensor != "mag":
-            found.append(_Named(sensor, columns, (x[1], y[1], z[1]), reason))
+            found.append(TriadOfColumns(sensor, columns, (x[1], y[1], z[1]), reason, device_of(called[x[0]])))
     return found
 
 
@@ -135,7 +153,9 @@ def _nameless(values: Array, t: Array | None, file: str) -> list[SensorFound]:
         and not (np.diff(values[:, index]) >= 0.0).all()
     ]
     windows = [
-        _Named("", (k, k + 1, k + 2), (Said(), Said(), Said()), f"columns {k} to {k + 2} have no names")
+        TriadOfColumns(
+            "", (k, k + 1, k + 2), (Said(), Said(), Said()), f"columns {k} to {k + 2} have no names"
+        )
         for k in able
         if {k + 1, k + 2} <= set(able)
     ]
@@ -143,13 +163,13 @@ def _nameless(values: Array, t: Array | None, file: str) -> list[SensorFound]:
     if len(able) == 3 and len(windows) == 1 and len(hints) == 1 and hints[0] != "mag":
         only = replace(windows[0], sensor=hints[0], reason=f"the name says {quoted(file)}")
         if hints[0] == "acc":
-            return [_with_acc_unit(only, values)]
-        return [_with_gyro_unit(only, None, values, t is not None, False)]
+            return [with_acc_unit(only, values)]
+        return [with_gyro_unit(only, None, values, t is not None, False)]
     steady = [window for window in windows if gravity_unit(values[:, window.columns])]
     if not steady:
-        return []
+        return _by_sphere(windows, values)[0]
     first = min(steady, key=lambda window: (_unlike(values[:, window.columns]), window.columns))
-    found = [_with_acc_unit(first, values)]
+    found = [with_acc_unit(first, values)]
     apart = [window for window in windows if not set(window.columns) & set(first.columns)]
     rows = np.arange(len(values), dtype=float) if t is None else t
     seen = [(turns(values[:, first.columns], values[:, window.columns], rows), window) for window in apart]
@@ -158,14 +178,41 @@ def _nameless(values: Array, t: Array | None, file: str) -> list[SensorFound]:
         fit, window = min(
             turned, key=lambda each: sum(axis not in (0, k) for k, axis in enumerate(each[0].axes, 1))
         )
-        return [*found, _with_gyro_unit(window, fit, values, t is not None, "count" in found[0].units)]
+        return [*found, with_gyro_unit(window, fit, values, t is not None, "count" in found[0].units)]
     if len(apart) == 1:
-        gyro = _with_gyro_unit(apart[0], None, values, t is not None, "count" in found[0].units)
+        gyro = with_gyro_unit(apart[0], None, values, t is not None, "count" in found[0].units)
         asked = gyro.question or (
             f"Are columns {apart[0].columns[0]} to {apart[0].columns[2]} the gyro, in {gyro.units[0]}?"
         )
         found.append(replace(gyro, grade="guess", question=asked))
     return found
+
+
+def _by_sphere(
+    triads: Sequence[TriadOfColumns], values: Array
+) -> tuple[list[SensorFound], list[TriadOfColumns]]:
+    """The triad without a word that lies on a sphere about any centre, as accelerometers with a large bias do, and the
+    others that do so: a magnetometer scatters more, and which is which is asked."""
+    free = [triad for triad in triads if not triad.sensor]
+    spheres = [(fit, triad) for triad in free if (fit := sphere(values[:, triad.columns])) is not None]
+    if not spheres:
+        return [], []
+    spheres.sort(key=lambda each: each[0].scatter)
+    best = spheres[0][1]
+    rivals = [(fit, each) for fit, each in spheres[1:] if not set(each.columns) & set(best.columns)]
+    found = with_acc_unit(best, values)
+    place = f"columns {best.columns[0]} to {best.columns[2]}"
+    asked = (
+        f"Are {place} the accelerometers, in {found.units[0]}? They lie on a sphere, as a magnetometer does."
+    )
+    if rivals:
+        fit, other = rivals[0]
+        asked = (
+            f"Are {place} the accelerometers, in {found.units[0]}, and {other.columns[0]} to {other.columns[2]} a "
+            f"magnetometer? Both lie on a sphere, these with {fit.scatter / spheres[0][0].scatter:.2g} times the "
+            "scatter."
+        )
+    return [replace(found, grade="guess", question=asked)], [each for _, each in rivals]
 
 
 def _unlike(triad: Array) -> float:
@@ -174,25 +221,73 @@ def _unlike(triad: Array) -> float:
     return float(np.round(2.0 * np.log10(max(noise.max(), 1e-12) / max(noise.min(), 1e-12))))
 
 
-def _lone(letter: str, names: Sequence[str], units: Sequence[str | None]) -> tuple[int, Said] | None:
+def _lone(letter: str, names: Sequence[str], units: Units) -> tuple[int, Said] | None:
     """The only column whose name is that letter and perhaps a unit of rate."""
     found = []
     for index, (name, unit) in enumerate(zip(names, units, strict=True)):
         words = said(name, unit)
-        if words_of(name)[:1] == [letter] and (words.stem == f"{letter} |") and _may_be(words.unit, "gyro"):
+        if words_of(name)[:1] == [letter] and (words.stem == f"{letter} |") and may_be(words.unit, "gyro"):
             found.append((index, words))
     return found[0] if len(found) == 1 else None
 
 
-def _may_be(unit: str, sensor: str) -> bool:
-    """True for a unit of what the sensor measures, a count, or none."""
-    return not unit or unit == "count" or MEASURED.get(unit) == sensor
+def _plain(triads: Sequence[TriadOfColumns], sensor: str) -> list[TriadOfColumns]:
+    """The triads that words call a sensor; those whose names give way to plain ones only where there are no others."""
+    named = [triad for triad in triads if triad.sensor == sensor]
+    return [triad for triad in named if not triad.said[0].seldom] or named
 
 
-def _accelerometer(triads: Sequence[_Named], values: Array) -> _Named | None:
-    """The accelerometer: by words, and of several the first with the norm of gravity; else by that norm alone."""
-    named = [triad for triad in triads if triad.sensor == "acc"]
-    plain = [triad for triad in named if not triad.said[0].seldom] or named
+def _in_pairs(
+    triads: Sequence[TriadOfColumns], names: Sequence[str], chosen: Mapping[str, str]
+) -> list[TriadOfColumns]:
+    """The triads of devices that have both sensors; of the device whose column was chosen, and those columns, alone."""
+    for sensor, name in chosen.items():
+        picked = [triad for triad in triads if name.strip() == names[triad.columns[0]].strip()]
+        if sensor in ("acc", "gyro") and picked:
+            return [triad for triad in triads if triad is picked[0] or triad.device == picked[0].device]
+    of_both = {triad.device for triad in _plain(triads, "acc")} & {
+        triad.device for triad in _plain(triads, "gyro")
+    }
+    return [triad for triad in triads if triad.device in of_both]
+
+
+def _devices(triads: Sequence[TriadOfColumns]) -> list[tuple[str, ...]]:
+    """The devices, in order, whose every sensor is there as often as there are devices."""
+    kinds = [kind for kind in (_plain(triads, "acc"), _plain(triads, "gyro")) if kind]
+    named = [[triad.device for triad in kind] for kind in kinds]
+    first = named[0] if named else []
+    alike = all(sorted(devices) == sorted(first) for devices in named)
+    told_apart = () not in first and (len(kinds) > 1 or all(map(is_one_of_several, first)))
+    return list(dict.fromkeys(first)) if alike and len(set(first)) > 1 and told_apart else []
+
+
+def _first_of(
+    triads: Sequence[TriadOfColumns], sensor: str, device: tuple[str, ...], names: Sequence[str]
+) -> str:
+    """The name of the first column of a sensor of a device."""
+    return next(
+        names[triad.columns[0]] for triad in triads if (triad.sensor, triad.device) == (sensor, device)
+    )
+
+
+def _with_others(found: SensorFound, triads: Sequence[TriadOfColumns], names: Sequence[str]) -> SensorFound:
+    """A sensor with words on the triads of the same kind that were not taken."""
+    others = [
+        names[triad.columns[0]].strip()
+        for triad in triads
+        if triad.sensor == found.sensor and triad.columns != found.columns
+    ]
+    if not others:
+        return found
+    return replace(found, reason=f"{found.reason}; not taken: {', '.join(map(quoted, others[:3]))}")
+
+
+def _accelerometer(
+    triads: Sequence[TriadOfColumns], values: Array, pairs: Sequence[TriadOfColumns]
+) -> TriadOfColumns | None:
+    """The accelerometer: by words, and of several the first with the norm of gravity, best of a device that has a gyro,
+    too; else by that norm alone."""
+    plain = _plain(pairs, "acc") or _plain(triads, "acc")
     steady = [triad for triad in plain or triads if gravity_unit(values[:, triad.columns])]
     if plain:
         return (steady or plain)[0]
@@ -201,99 +296,23 @@ def _accelerometer(triads: Sequence[_Named], values: Array) -> _Named | None:
 
 
 def _gyro(
-    triads: Sequence[_Named], acc: _Named | None, values: Array, t: Array | None
-) -> tuple[_Named | None, SeenTurns | None]:
-    """The gyro: by words, else the triad whose turns the accelerometers see; and these turns, where they are seen."""
-    named = [triad for triad in triads if triad.sensor == "gyro"]
-    able = [triad for triad in named if not triad.said[0].seldom] or named
+    triads: Sequence[TriadOfColumns],
+    acc: TriadOfColumns | None,
+    values: Array,
+    t: Array | None,
+    pairs: Sequence[TriadOfColumns],
+) -> tuple[TriadOfColumns | None, SeenTurns | None]:
+    """The gyro: by words, best of the accelerometer's device, else the triad whose turns the accelerometers see; and
+    these turns, where they are seen."""
+    able = _plain(triads, "gyro")
+    of_device = [triad for triad in _plain(pairs, "gyro") if acc is not None and triad.device == acc.device]
     rows = np.arange(len(values), dtype=float) if t is None else t
 
-    def seen(triad: _Named) -> SeenTurns | None:
+    def seen(triad: TriadOfColumns) -> SeenTurns | None:
         return None if acc is None else turns(values[:, acc.columns], values[:, triad.columns], rows)
 
     if able:
-        return able[0], seen(able[0])
+        first = (of_device or able)[0]
+        return first, seen(first)
     free = [triad for triad in triads if triad.sensor == "" and triad is not acc]
     return next(((triad, fit) for triad in free if (fit := seen(triad)) is not None), (None, None))
-
-
-def _with_acc_unit(triad: _Named, values: Array) -> SensorFound:
-    """The accelerometer with its units."""
-    stated = tuple(word.unit for word in triad.said)
-    norm, scatter = norm_of(values[:, triad.columns])
-    unit = gravity_unit(values[:, triad.columns])
-    words = "certain" if triad.sensor else "likely"
-    if all(stated) and all(_may_be(each, "acc") for each in stated):
-        reason = f"{triad.reason}; with this unit"
-        size = SIZES.get(stated[0])
-        if size is not None and (abs(norm * size / G0 - 1.0) > 0.04 or scatter > 0.08):
-            reason += f", though the median norm is {norm:.4g}, not gravity"
-        return SensorFound("acc", triad.columns, (stated[0], stated[1], stated[2]), words, reason)
-    if unit and unit != "count":
-        return _alike("acc", triad, unit, words, f"the median norm is {norm:.4g}, gravity in {unit}")
-    whole = is_whole(values[:, triad.columns])
-    near = min(("m/s^2", "g", "mg"), key=lambda each: abs(np.log(max(norm, 1e-9) * SIZES[each] / G0)))
-    if not whole and abs(norm * SIZES[near] / G0 - 1.0) < 0.15:
-        reason = f"the median norm is {norm:.4g}, near to gravity in {near}"
-        return _alike("acc", triad, near, "likely", reason)
-    reason = f"the median norm is {norm:.5g}, gravity in neither m/s^2 nor g"
-    return _alike("acc", triad, "count", "likely", reason + (", whole numbers" if whole else ""))
-
-
-def _with_gyro_unit(
-    triad: _Named, seen: SeenTurns | None, values: Array, timed: bool, beside_counts: bool
-) -> SensorFound:
-    """The gyro with its units: as stated, by its turns, by the steps of its converter, or by its reach, which beside
-    accelerometers in counts is that of counts where it is too large for deg/s."""
-    rates = values[:, triad.columns]
-    stated = tuple(word.unit for word in triad.said)
-    words = "certain" if triad.sensor else "likely"
-    if all(stated) and all(_may_be(each, "gyro") for each in stated):
-        reason = f"{triad.reason}; with this unit"
-        if seen is not None and timed and stated[0] in SIZES:
-            ratio = SIZES[stated[0]] / seen.size
-            if not 0.85 < ratio < 1.18:
-                reason += f", though it shows {ratio:.3g} times the turns that the accelerometers see"
-        return SensorFound("gyro", triad.columns, (stated[0], stated[1], stated[2]), words, reason)
-    if is_whole(rates):
-        reason = "all are whole numbers"
-        if seen is not None and timed and abs(SIZES["deg/s"] / seen.size - 1.0) < 0.15:
-            reason += ", which by the turns that the accelerometers see are deg/s"
-            return _alike("gyro", triad, "deg/s", words, reason)
-        if triad.sensor and "gyroADC" in triad.reason and np.nanmax(np.abs(rates)) <= _FULL_SCALE:
-            return _alike("gyro", triad, "deg/s", "likely", f"{reason}, which Betaflight writes in deg/s")
-        if seen is not None and timed:
-            reason += (
-                f"; by the turns that the accelerometers see {SIZES['deg/s'] / seen.size:.4g} for 1 deg/s"
-            )
-        return _alike("gyro", triad, "count", "likely", reason)
-    if seen is not None and timed:
-        near = min(
-            ("rad/s", "deg/s", "mrad/s", "mdeg/s"), key=lambda each: abs(np.log(SIZES[each] / seen.size))
-        )
-        if abs(SIZES[near] / seen.size - 1.0) < 0.15:
-            share = seen.size / SIZES[near]
-            reason = f"the turns that the accelerometers see say {near} ({share:.3f}, u {seen.u:.1%})"
-            return _alike("gyro", triad, near, words, reason)
-    if unit := lattice_unit(rates):
-        return _alike("gyro", triad, unit, "likely", f"all lie on steps of a converter, written in {unit}")
-    reach = float(np.nanmax(np.abs(rates - np.nanmedian(rates, axis=0))))
-    if reach > 35.0:
-        if reach < 4100.0:
-            reason = f"the largest move is {reach:.4g}, which is none in rad/s"
-            return _alike("gyro", triad, "deg/s", "likely", reason)
-        reason = f"the largest move is {reach:.4g}, which is none in deg/s"
-        return _alike("gyro", triad, "count" if beside_counts else "mdeg/s", "likely", reason)
-    noise = float(np.nanmedian(np.abs(np.diff(rates, axis=0))))
-    unit = "deg/s" if noise > 0.012 and reach > 5.0 else "rad/s"
-    reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}"
-    other = "rad/s" if unit == "deg/s" else "deg/s"
-    question = f"Is the gyro in {unit} or {other}? It moves by {reach:.3g}, and nothing else tells."
-    return _alike("gyro", triad, unit, "guess", reason, question)
-
-
-def _alike(sensor: str, triad: _Named, unit: str, grade: str, reason: str, question: str = "") -> SensorFound:
-    """A triad with one unit."""
-    return SensorFound(
-        sensor, triad.columns, (unit, unit, unit), grade, f"{triad.reason}; {reason}", question
-    )

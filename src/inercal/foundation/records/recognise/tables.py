@@ -11,16 +11,19 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError
-from inercal.foundation.records.channels import Origin, TimeForm
+from inercal.foundation.records.channels import TimeForm, measures_motion, of_a_table
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.records.read import format_of
 from inercal.foundation.records.read.join import unwrapped
 from inercal.foundation.records.read.table import FileOptions, FirstLook
 from inercal.foundation.records.read.time_stamps import seconds_of
 from inercal.foundation.records.recognise.clocks import clock
+from inercal.foundation.records.recognise.known_inputs import not_taken, of_known_input
 from inercal.foundation.records.recognise.sensors import sensors
+from inercal.foundation.records.recognise.stems import by_count
+from inercal.foundation.records.recognise.thermometers import one_thermometer
 from inercal.foundation.records.recognise.units import Guess, median, quoted, units_of
-from inercal.foundation.records.recognise.words import said, sensors_named
+from inercal.foundation.records.recognise.words import MEASURED, is_size, said, sensors_named
 from inercal.foundation.records.titles import (
     OF_A_MODEL,
     bare,
@@ -33,22 +36,22 @@ from inercal.foundation.records.titles import (
 )
 from inercal.foundation.units import parse_unit
 
-MEASURED = re.compile(r"acc_\w+|a\d+|gyro\w*|y_[xy]|wc_[xyz]|th_[xyz]")
-"""Channels that measure motion."""
-
 _LISTED = 40
 _HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
 
 @dataclass(frozen=True)
 class FileGuess:
-    """Guess about one file, or about the columns of one clock in it."""
+    """Guess about one file, or about the columns of one clock in it; ``known`` are words on a known input that is taken
+    for no channel."""
 
     path: Path
     guesses: Mapping[str, Guess]
     leading: tuple[str, ...]
     unused: tuple[str, ...] = ()
     options: FileOptions = field(default_factory=FileOptions)
+    titles: tuple[str, ...] = ()
+    known: str = ""
 
 
 def samples_of(path: Path) -> Sequence[FirstLook]:
@@ -59,23 +62,30 @@ def samples_of(path: Path) -> Sequence[FirstLook]:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
 
 
-def look(path: Path, on_table: bool, of_model: bool, rate: float | None) -> list[FileGuess]:
-    """Guess the channels of one file: of its longest columns, and of others that have a time of their own."""
+def look(
+    path: Path, on_table: bool, of_model: bool, rate: float | None, chosen: Mapping[str, str]
+) -> list[FileGuess]:
+    """Guess the channels of one file: of its longest columns, and of others that have a time of their own.
+
+    ``chosen`` are names of columns by sensor, where it was asked which of several are meant.
+    """
     samples = sorted(samples_of(path), key=lambda sample: -len(sample.values))
     lengths: dict[int, dict[str, Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
         named = sample.names or on_table or of_model
         for guess in (
-            _by_header(sample, on_table, of_model, path.name, rate)
+            _by_header(sample, on_table, of_model, path.name, rate, chosen)
             if named
-            else _by_shape(sample, path, rate)
+            else _by_shape(sample, path, rate, chosen)
         ):
             guesses.setdefault(guess.name, guess)
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
     options = next((sample.options for sample in samples if sample.options.transpose), samples[0].options)
-    files = [FileGuess(path, longest, leading, options=options)]
+    titles = tuple(name.strip() for sample in samples for name in sample.names)
+    known = next((words for sample in samples if (words := not_taken(sample, on_table))), "")
+    files = [FileGuess(path, longest, leading, options=options, titles=titles, known=known)]
     for guesses in others:
         guessed = {name for file in files for name in file.guesses} - {"t"}
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
@@ -99,7 +109,7 @@ def _unused(samples: Sequence[FirstLook], files: Sequence[FileGuess]) -> tuple[s
     columns = []
     for sample in samples:
         for index, values in enumerate(sample.values.T):
-            if (origin := origin_of(sample, index)) in used:
+            if (origin := sample.origin(index)) in used:
                 continue
             begins = ", ".join(f"{value:.6g}" for value in values[:3])
             if np.isnan(values).all():
@@ -111,37 +121,57 @@ def _unused(samples: Sequence[FirstLook], files: Sequence[FileGuess]) -> tuple[s
 
 
 def _by_header(
-    sample: FirstLook, on_table: bool, of_model: bool, file: str, rate: float | None
+    sample: FirstLook,
+    on_table: bool,
+    of_model: bool,
+    file: str,
+    rate: float | None,
+    chosen: Mapping[str, str],
 ) -> list[Guess]:
     """Channels by the names in the header."""
     guesses = []
-    for index, title in enumerate(sample.names):
-        name, unit = titled(title, sample.units[index] if sample.units else None)
+    called = sample.names if on_table or of_model else by_count(sample.names, sample.values)
+    for index, (title, meant) in enumerate(zip(sample.names, called, strict=True)):
+        beside = sample.units[index] if sample.units else None
+        name, unit = titled(meant, beside)
         if of_model:
             name = numbered(title) or OF_A_MODEL.get(name or "", name) or rate_of_model(title, unit)
         elif on_table:
             name = name or of_table(title)
+        if name is None and MEASURED.get(said(title, beside).unit) == "temperature":
+            name = "temperature"
         values = sample.values[:, index]
         # what is no number, as dates, can be a label alone; a time by its unit alone may be some interval
         if name is None or (name != "label" and np.isnan(values).all()):
             continue
-        if name == "t" and titled(bare(title))[0] != "t" and not _is_clock(values):
+        if name == "t" and titled(bare(meant))[0] != "t" and not _is_clock(values):
             continue
         if name == "temperature" and unit is None and abs(median(values)) > _HOT:
             continue
         reason = f"the header says {quoted(title)}"
-        guesses.append(Guess(name, origin_of(sample, index), values, unit, reason))
+        guesses.append(Guess(name, sample.origin(index), values, unit, reason))
     if of_model:
         return _counted(guesses)
     if not on_table:
-        return _recognised(sample, guesses, file, rate)
-    return guesses if any(MEASURED.fullmatch(each.name) for each in guesses) else guesses + _by_norm(sample)
+        return _recognised(sample, called, guesses, file, rate, chosen)
+    if any(measures_motion(each.name) for each in guesses) and of_a_table(each.name for each in guesses):
+        return guesses
+    return of_known_input(sample, guesses) or (
+        guesses if any(measures_motion(each.name) for each in guesses) else guesses + _by_norm(sample)
+    )
 
 
-def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float | None) -> list[Guess]:
+def _recognised(
+    sample: FirstLook,
+    called: Sequence[str],
+    guesses: list[Guess],
+    file: str,
+    rate: float | None,
+    chosen: Mapping[str, str],
+) -> list[Guess]:
     """Channels by their names, the accelerometers and gyros among them recognised by all the evidence there is."""
-    if found_t := clock(sample.names, sample.units, sample.values, sample.texts):
-        origin, values = origin_of(sample, found_t.column), sample.values[:, found_t.column]
+    if found_t := clock(called, sample.units, sample.values, sample.texts):
+        origin, values = sample.origin(found_t.column), sample.values[:, found_t.column]
         said_of = found_t.unit, found_t.reason, found_t.grade, found_t.question
         if found_t.stamps is not None:
             values = _times(sample, found_t.column, found_t.stamps)
@@ -151,10 +181,11 @@ def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float 
     t = None if rate is None else np.arange(len(sample.values)) / rate
     if stamps := by_name.get("t"):
         t = stamps.values * parse_unit(units_of({"t": stamps})["t"].unit).factor
-    triads = sensors(sample.names, sample.units, sample.values, t, file)
-    used = {origin_of(sample, index) for triad in triads for index in triad.columns}
+    triads = sensors(sample.names, sample.units, sample.values, t, file, called, chosen)
+    guesses = one_thermometer(sample, guesses, chosen)
+    used = {sample.origin(index) for triad in triads for index in triad.columns}
     found = {triad.sensor for triad in triads}
-    titles = {origin_of(sample, index): name for index, name in enumerate(sample.names)}
+    titles = {sample.origin(index): name for index, name in enumerate(sample.names)}
     kept = [
         guess
         for guess in guesses
@@ -164,7 +195,7 @@ def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float 
     ]
     for triad in triads:
         for axis, index, unit in zip("xyz", triad.columns, triad.units, strict=True):
-            values, origin = sample.values[:, index], origin_of(sample, index)
+            values, origin = sample.values[:, index], sample.origin(index)
             what = Guess(
                 f"{triad.sensor}_{axis}", origin, values, unit, triad.reason, triad.grade, triad.question
             )
@@ -179,7 +210,41 @@ def _recognised(sample: FirstLook, guesses: list[Guess], file: str, rate: float 
             elif stated is not None and stated.origin == origin and stated.unit:
                 what = replace(what, unit=stated.unit)
             kept.append(what)
-    return kept
+    return _aside(sample, called, kept if triads else [*kept, *_alone(sample, kept)])
+
+
+def _alone(sample: FirstLook, guesses: Sequence[Guess]) -> list[Guess]:
+    """The gyro, or the accelerometer, of one axis that is not named, beside a time: its unit is one of rate or
+    acceleration, and no word says that it is something else."""
+    if not any(guess.name == "t" for guess in guesses) or any(
+        measures_motion(guess.name) for guess in guesses
+    ):
+        return []
+    found = []
+    for index, name in enumerate(sample.names):
+        words = said(name, sample.units[index] if sample.units else None)
+        sensor = MEASURED.get(words.unit, "")
+        other = words.sensor not in ("", sensor) or words.axis or words.never or words.seldom
+        if sensor in ("acc", "gyro") and not other and not is_size(name):
+            values = sample.values[:, index]
+            reason = f"the header says {quoted(name.strip())}"
+            channel = "gyro" if sensor == "gyro" else "a1"
+            found.append(Guess(channel, sample.origin(index), values, words.unit, reason, "certain"))
+    return found if len(found) == 1 else []
+
+
+def _aside(sample: FirstLook, called: Sequence[str], guesses: list[Guess]) -> list[Guess]:
+    """Channels, the last of which says that a magnetometer is left aside where there is one."""
+    names = [
+        name.strip()
+        for index, name in enumerate(sample.names)
+        if (words := said(called[index], sample.units[index] if sample.units else None)).sensor == "mag"
+        and words.axis
+    ]
+    if not names or not guesses or not guesses[-1].grade:
+        return guesses
+    reason = f"{guesses[-1].reason}; a magnetometer is left aside: {', '.join(map(quoted, names[:3]))}"
+    return [*guesses[:-1], replace(guesses[-1], reason=reason)]
 
 
 def _counted(guesses: list[Guess]) -> list[Guess]:
@@ -211,7 +276,7 @@ def _by_norm(sample: FirstLook) -> list[Guess]:
     steadier = "the norm is steady" if len(found) == 1 else "of two triads, this has the steadier norm"
     return [
         Guess(
-            f"{kind}_{axis}", origin_of(sample, index), sample.values[:, index], units[index],
+            f"{kind}_{axis}", sample.origin(index), sample.values[:, index], units[index],
             steadier if kind == "acc" else "the norm varies",
         )
         for kind, triad in zip(kinds, found, strict=True)
@@ -241,26 +306,18 @@ def _placed(sample: FirstLook, stamps: TimeForm | None) -> TimeForm | None:
     """Stamps whose column beside is named as a map names it."""
     if stamps is None or not isinstance(stamps.beside, int):
         return stamps
-    return replace(stamps, beside=origin_of(sample, stamps.beside))
+    return replace(stamps, beside=sample.origin(stamps.beside))
 
 
-def origin_of(sample: FirstLook, index: int) -> Origin:
-    """The name of a column in a map."""
-    if sample.times_named:
-        alone = not sample.numbered and sample.times_named[sample.names[index]] == 1
-        return sample.names[index] if alone else index
-    return (sample.variable, index) if sample.variable else index
-
-
-def _by_shape(sample: FirstLook, path: Path, rate: float | None) -> list[Guess]:
+def _by_shape(sample: FirstLook, path: Path, rate: float | None, chosen: Mapping[str, str]) -> list[Guess]:
     """Channels of an array without names, by its numbers, or by its own name where that says the sensor."""
     names = ("",) * sample.values.shape[1]
-    called = (
+    file = (
         path.name
         if not sample.variable or len(sensors_named(sample.variable)) != 1
         else f"{sample.variable}."
     )
-    return _recognised(replace(sample, names=names, numbered=True), [], called, rate)
+    return _recognised(replace(sample, names=names, numbered=True), names, [], file, rate, chosen)
 
 
 def _spread(triad: Array) -> float:

@@ -26,7 +26,8 @@ class Guess:
     """A channel thought to be in a column: where that is, its values, a unit if it was said, and why.
 
     ``grade`` is that of a channel recognised with its unit (certain, likely or guess), empty of others; of a guess
-    there is a ``question``. Of the time there may be ``stamps`` other than plain numbers.
+    there is a ``question``. Of the time there may be ``stamps`` other than plain numbers. The values are those of the
+    file; times ``factor`` they are in the unit.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Guess:
     grade: str = ""
     question: str = ""
     stamps: TimeForm | None = None
+    factor: float = 1.0
 
 
 def median(values: Array) -> float:

@@ -49,7 +49,12 @@ _TIME = (
     r"tempo|hora|heure|时间|epoch|clock|tow|seconds?|milliseconds|uhrzeit|datum|date|datetime"
 )
 _NEVER = r"bias\w*|drift|cov\w*|std|sd|sigma|var|variance|err\w*|status|clip\w*|setpoint|motor|debug|true|ideal|jerk"
-_SELDOM = r"user|free|gravity|offset|relative|ref|nominal|gt|sim|clean|corrupted"
+_SELDOM = r"user|free|gravity|offset|relative|ref|nominal|gt|truth|groundtruth|sim|clean"
+_HOW = (  # how the output of one device was treated
+    r"raw|filt\w*|lp|smooth\w*|cal\w*|uncal\w*|corr\w*|comp\w*|meas\w*|noisy|data|sensor\w*|out\w*|val\w*|vec\w*|field|adc|"
+    + _SELDOM
+)
+_PLACES = r"left|right|upper|lower|front|rear|back|top|bottom|inner|outer|master|slave|primary|secondary|main|backup"
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,25 @@ def sensors_named(text: str) -> list[str]:
     """The sensors that a file's name, or a line above the numbers, speaks of by a word of at least three letters."""
     found = [_sensor(word) for word in words_of(text) if len(word) > 2]
     return [sensor for sensor in ("acc", "gyro", "mag") if sensor in found]
+
+
+def device_of(name: str) -> tuple[str, ...]:
+    """The words of a column's name other than on sensor, axis, unit and treatment, as ``("imu", "2")``."""
+    stem = said(name).stem.split()
+    return tuple(word for word in stem if word != "|" and not _sensor(word) and not re.fullmatch(_HOW, word))
+
+
+def is_size(name: str) -> bool:
+    """True for the name of a norm or total, which is no output of a sensor."""
+    return any(
+        re.fullmatch(r"abs|norm|mag|magnitude|total|resultant|rms|sum|mean|max|peak", word)
+        for word in words_of(name)
+    )
+
+
+def is_one_of_several(device: tuple[str, ...]) -> bool:
+    """True for words that tell devices alike apart: a number at the end, or a place."""
+    return bool(device) and (device[-1].isdigit() or any(re.fullmatch(_PLACES, word) for word in device))
 
 
 def _sensor(word: str) -> str:

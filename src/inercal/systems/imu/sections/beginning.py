@@ -9,9 +9,10 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.record import Record
 from inercal.systems.imu.rows import is_counted
 from inercal.systems.imu.sections.cutting.proposal import Proposal
-from inercal.systems.imu.sections.cutting.table import table_text
+from inercal.systems.imu.sections.cutting.table import stated_rows, table_text
 from inercal.systems.imu.sections.cutting.words import claim
 from inercal.systems.imu.sections.outcome import by_file, refuse_samples
+from inercal.systems.imu.settings import ImuSettings, MeansSettings, SectionsSettings
 
 
 def beginning(records: Sequence[Record]) -> tuple[str, tuple[Finding, ...]] | None:
@@ -32,6 +33,23 @@ def beginning(records: Sequence[Record]) -> tuple[str, tuple[Finding, ...]] | No
     if not found.rows or (one_log and all(row.up is None for row in found.rows)):
         return None
     return table_text(found.rows), found.questions
+
+
+def needs_gyro(settings: ImuSettings | None, records: Sequence[Record]) -> bool:
+    """False for rests alone, of which accelerometers tell all but the biases of a gyro; ``settings`` is None of a new
+    study, which has the sections of `beginning`.
+
+    Raises `InputError` for sections that cannot be read.
+    """
+    method = SectionsSettings() if settings is None else settings.method
+    if not all("acc_x" in record for record in records):
+        return True
+    if isinstance(method, MeansSettings):
+        return False
+    if not isinstance(method, SectionsSettings) or (settings is None and beginning(records) is None):
+        return True
+    rows = stated_rows(method) or Proposal.of(by_file(records)).rows
+    return not rows or any(row.kind != "rest" for row in rows)
 
 
 def _told(named: Mapping[str, Record]) -> bool:
