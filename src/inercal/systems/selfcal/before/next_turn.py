@@ -14,7 +14,7 @@ from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.platform.coefficients import divisor, to_product
 from inercal.systems.selfcal.platform.joint_limits import beyond
-from inercal.systems.selfcal.platform.plan import JointName, PlatformPlan, Turn, motion
+from inercal.systems.selfcal.platform.plan import JointName, PlatformPlan, Turn, motion, of_joints
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.settings import SelfcalSettings
 
@@ -60,7 +60,7 @@ def next_turns(
     by = np.abs(divisor(coefficients))
     found = []
     for moves in _sequences({JOINTS.index(name) for name in settings.fixed}):
-        tried = settings.joints.kept(replace(plan, moves=moves, start=tuple(map(float, th))))
+        tried = settings.joints.kept(replace(plan, moves=moves, start=of_joints(th.tolist())))
         if beyond(tried, settings.limits, settings.joints):
             continue
         along = motion(tried, problem.world)
