@@ -355,7 +355,9 @@ def _table(key: str, rows: Sequence[Mapping[str, Any]]) -> tuple[str, list[tuple
     """Title, columns (name and unit) and cells of rows of the result; what is nested in a row has no column."""
     title, _ = _labelled((key,))
     names = [
-        name for name, value in rows[0].items() if not isinstance(value, dict) and "[[" not in str(value)[:2]
+        name
+        for name, value in rows[0].items()
+        if not isinstance(value, dict) and not str(value).startswith("[[")
     ]
     heads = [_labelled((name,)) for name in names]
     columns = [_column([_sized(name, row[name]) for row in rows]) for name in names]
