@@ -296,9 +296,15 @@ def test_modules_can_be_read_in_one_go():
 
 #: what `tests/counts.py` counts; lowered when an issue is done
 CEILINGS = {
+<<<<<<< HEAD
     "names used across folders": 1510,
     "class names shared": 5,
     "constants outside Limits": 449,
+=======
+    "names used across folders": 1519,
+    "class names shared": 5,
+    "constants outside Limits": 450,
+>>>>>>> papers48
     "modules": 665,
 }
 

@@ -12,6 +12,7 @@ import inercal as ic
 from inercal.cli import run
 from inercal.foundation.errors import InputError
 from inercal.foundation.records.write import write_record
+from inercal.systems.aoa.figures import paper
 from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.runs.outcome import error_terms
 from inercal.systems.aoa.runs.run_table import read_runs_table
@@ -138,9 +139,18 @@ def test_error_terms_of_the_papers_figures():
     """10 deg at 0.5 Hz, r2 = 0.2 m: mechanical compensation leaves 2.6 % of the low pass, dual 0.16 % of untreated."""
     of = study()
     of = replace(of, noise=replace(of.noise, accelerometer_bias=1e-12, gyro_bias=1e-12))
-    terms = error_terms(of, 10.0 * DEG, 0.5)
+    terms = error_terms(of, 10.0 * DEG, 0.5, 1.0 / FS)
     assert terms["centrifugal, mechanical"] / terms["centrifugal, low pass"] == pytest.approx(0.026, abs=5e-4)
     assert terms["tangential, dual"] / terms["tangential, none"] == pytest.approx(0.0016, abs=5e-5)
+
+
+@for_each(("times", "taken"), ((0.99, "low pass"), (1.01, "mechanical")))
+def test_decision_changes_over_at_a_peak_rate_of_4_449_errors_of_the_gyro(times, taken):
+    of = study()
+    of = replace(of, noise=replace(of.noise, gyro_bias=1e-12))
+    frequency = times * (2.0 + math.sqrt(6.0)) * of.noise.gyro / (2.0 * math.pi * 5.0 * DEG)
+    terms = error_terms(of, 5.0 * DEG, frequency, 1.0 / FS)
+    assert terms["centrifugal, decision"] == terms[f"centrifugal, {taken}"]
 
 
 def test_the_interpolated_covariance_holds_a_random_walk():
@@ -275,3 +285,24 @@ def test_points_that_are_clipped_raise_an_alarm(entry):
     found = ic.runs(entry / "clipped.txt", entry / "aoa.toml").findings
     (alarm,) = (each for each in found if "rows of a point" in each.message)
     assert alarm.code == "saturation"
+
+
+@pytest.mark.slow
+def test_the_papers_figures_have_a_line_for_each_way(entry):
+    """What each way leaves by closed form: decision is the less of its two, the first difference of the gyro is white
+    noise whatever the motion, and complementary and improved without the dual pair are two methods."""
+    (entry / "figures.csv").write_text(
+        "file,role,amplitude,frequency\nup1.csv,up,,\nsine.csv,run,5 deg,1 Hz\n"
+    )
+    compared = ic.runs(entry / "figures.csv", entry / "aoa.toml", compare=True)
+    (sine,) = compared.evidence.oscillating
+    terms = sine.terms
+    assert terms["tangential, differentiated"] == pytest.approx(0.25 * math.sqrt(2.0) * 0.2 * DEG * FS / G)
+    alone = [sine.errors[f"{static}, mechanical, none"] for static in ("complementary", "improved")]
+    assert abs(alone[0] / alone[1] - 1.0) > 0.01
+    ways = []
+    for picture in paper.pictures(compared.evidence):
+        lines = [line for axes in picture.figure.axes for line in axes.get_lines()]
+        ways.append({line.get_label() for line in lines if not line.get_label().startswith("_")})
+    static = {"complementary", "improved", "segmented"}
+    assert ways == [{"low pass", "mechanical", "decision"}, {"none", "differentiated", "dual"}, static]

@@ -82,6 +82,10 @@ def test_disturbances_by_set(folder):
             ["selfcal.toml", "noise.encoder: found '0 arcsec'"],
         ),
         (["--out", "run.csv", "--set", "plan.path=round"], ["plan.path", "expected 'paper'"]),
+        (
+            ["--out", "run.csv", "--set", "filter.gating=any", "--set", "filter.gating_near=6 deg"],
+            ["filter.gating_far", "found 5 deg", "at least gating_near"],
+        ),
     ],
 )
 def test_one_line_for_what_is_wrong(more, words, folder, capsys):
@@ -123,6 +127,9 @@ def test_the_example_that_ships_is_the_simulation_of_its_study():
     assert_allclose(found.rate, expected.rate, rtol=0.0, atol=np.radians(0.51e-6) / 3600.0)
     assert_allclose(found.th, expected.th, rtol=0.0, atol=np.radians(0.51e-7))
     assert_allclose(found.acc, expected.acc, rtol=0.0, atol=0.51e-7)
+    assert found.reference is not None
+    attitude = simulate(experiment(settings), np.random.default_rng(1)).attitude
+    assert_allclose(found.reference, attitude, rtol=0.0, atol=1e-9)
     assert settings.plan == path("paper")
     assert_allclose(settings.truth, TRUTH, rtol=1e-12)
 

@@ -18,6 +18,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import NAMES, to_product, units
 from inercal.systems.selfcal.platform.rig import Base
 from inercal.systems.selfcal.result.outcome import assemble, verdict
+from inercal.systems.selfcal.settings import Filter, Gating
 from inercal.systems.selfcal.simulate import experiment, simulate
 
 LATITUDE_U = 0.02 * DEG
@@ -265,3 +266,17 @@ def test_a_latitude_that_nobody_knows_hides_what_the_path_shows():
     assert "what is stated of latitude" in result.message
     assert {"kg0_x", "kg0_y"} <= set(result.result["at_prior"])
     assert result["kg0_x"].u > 0.9 * settings.prior[0]
+
+
+def test_a_coefficient_that_gating_hides_is_not_called_a_lack_of_turns():
+    """Rule `any` never admits an accelerometer on this path, which shows all of them without it."""
+    settings = study(filter=Filter(gating=Gating("any")))
+    gated, _ = assembled(settings)
+    assert gated.status is Status.UNOBSERVABLE
+    assert "near-level gating leaves out the rows that show it" in gated.message
+    assert "add turns" not in gated.message
+
+
+def test_without_gating_a_path_that_shows_too_little_is():
+    lacking, _ = assembled(study(path="paper two turns"))
+    assert "gating" not in " ".join([lacking.message, *(finding.headline for finding in lacking.findings)])

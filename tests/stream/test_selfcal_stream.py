@@ -1,7 +1,10 @@
 """A platform calibrated row by row: to the digits of the whole file, whatever the rows are like, killed or not."""
 
 import io
+import math
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,12 +19,14 @@ from inercal.foundation.errors import InputError, RecordError, StudyError
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
+from inercal.systems.selfcal.before.bounds import bounds
+from inercal.systems.selfcal.before.next_turn import next_turns
 from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.filters.filter_result import product_form
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import KA1, names
-from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
+from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.settings import Filter, Gating
@@ -385,6 +390,34 @@ def test_it_ends_at_the_first_row_that_meets_the_goals(tmp_path):
     saving = Saving(tmp_path / "saved", 10)
     until(text, goal, saving=saving)
     assert until(text, goal, saving=saving)[0] == [title]
+
+
+def test_the_turn_that_meets_the_goals_soonest_is_said(tmp_path):
+    """A platform that has turned about z alone: ds_z needs a turn of X_p about its axis. What is advised, added to the
+    plan, meets the goal at about the time that was said, by bounds of the whole path; no single turn does sooner."""
+    plan = PlatformPlan((Turn("z", math.pi), Rest(4.0)), step=0.2)
+    of = replace(study(plan=plan), goal={"ds_z": math.radians(3.0 / 3600.0)})
+    lines, said = Lines(io.BytesIO(recorded(tmp_path, plan=plan).encode()), "log", None, lambda _: None), []
+    solved = problem(of)
+    advise = partial(next_turns, of, solved)
+    run(Selfcal(lines, solved, 1e4, said.append, goal=of.goal, advise=advise), lines, lambda _: None)
+    told = [finding for finding in said if finding.code == "goal_missed"]
+    assert len(told) == 2  # where it comes to rest, and at the end
+    assert "ds_z" in told[0].headline
+    words = re.fullmatch(r"turn (.*): all goals are met after (.*) s", told[-1].action)
+    more = [
+        Turn(joint, math.radians(float(angle))) for joint, angle in re.findall(r"\((.) (\S+) deg\)", words[1])
+    ]
+
+    def first_met(turns):
+        longer = replace(plan, moves=(*plan.moves, *turns))
+        u = bounds(motion(longer, of.world), solved, history=True).history[:, solved.names.index("ds_z")]
+        met = np.flatnonzero(u <= of.goal["ds_z"])
+        return plan.step * met[0] - plan.duration if len(met) else math.inf
+
+    assert first_met(more) == pytest.approx(float(words[2]), rel=0.1)
+    singles = [first_met([Turn(joint, sign * math.pi)]) for joint in "xyz" for sign in (1, -1)]
+    assert first_met(more) <= min(singles) * 1.1
 
 
 def test_it_does_not_end_where_the_rows_contradict_the_model(tmp_path):

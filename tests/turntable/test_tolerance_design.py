@@ -16,9 +16,10 @@ from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.figures.tolerances import page
+from inercal.systems.turntable.positions.front import front
 from inercal.systems.turntable.positions.tolerance_design import design_tolerances
 from inercal.systems.turntable.positions.tolerance_result import result
-from inercal.systems.turntable.settings import Tolerances
+from inercal.systems.turntable.settings import Constraint, Tolerances
 
 NOISE = 0.01 * DEG_H
 TERMS = ("DX_F", "DX_X", "DX_Y", "DX_Z", "DX_XX", "DX_YY", "DX_XY", "DX_XZ", "DX_YZ")
@@ -277,3 +278,47 @@ def test_bad_goals_and_costs_get_one_line(tmp_path, capsys, line, words):
     assert said.out == ""
     assert words in said.err
     assert said.err.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_the_front_against_the_covariance_written_out():
+    """Cheapest tolerances at each number of positions and u of the drift: u is that of the covariance written out here
+    over random directions of gravity, 40000 of which tell the mean to 1 %; more positions never cost more,
+    nor does a larger u."""
+    of = settings(prices={name: Price() for name in SIZES})
+    found = front(replace(of, design=replace(of.design, positions=16)))
+    a = np.random.default_rng(4).standard_normal((3, 40000))
+    a /= np.linalg.norm(a, axis=0)
+    rows = np.stack(
+        [
+            wheel_output("x", {"DX_F": 0.0} | dict.fromkeys(WHEEL_X, 0.0) | {term: 1.0}, a, np.zeros_like(a))
+            for term in TERMS
+        ]
+    )
+    for point in found.points[::4]:
+        widths = {name: size * ARCMIN * by for (name, size), by in zip(SIZES.items(), point.x, strict=True)}
+        C = covariance(point.plan.angles, widths)
+        assert np.sqrt(np.einsum("pn,pq,qn->n", rows, C, rows).mean()) == pytest.approx(point.drift, rel=0.02)
+    cost = {(len(point.plan), point.drift): point.cost for point in found.points}
+    for (number, drift), price in cost.items():
+        assert all(price >= other for (n, u), other in cost.items() if u == drift and n > number)
+        assert all(price >= other for (n, u), other in cost.items() if n == number and u > drift)
+
+
+@pytest.mark.slow
+def test_low_sensitivity_never_lowers_the_cost():
+    """The constraint leaves fewer positions to choose from; what leaves none is refused."""
+    of = settings(prices={name: Price() for name in SIZES})
+    asked = replace(
+        of.design, positions=12, constraint=Constraint(("dalpha_x2", "dtheta_z"), ("ax", "ay"), 0.6)
+    )
+    found = front(replace(of, design=asked)).points
+    cost = {(point.constrained, len(point.plan), point.drift): point.cost for point in found}
+    pairs = [(cost[False, n, u], price) for (constrained, n, u), price in cost.items() if constrained]
+    assert pairs
+    assert all(price >= 0.98 * free for free, price in pairs)  # searches are from random starts
+    tight = replace(asked, constraint=replace(asked.constraint, below=1e-9))
+    with pytest.raises(
+        StudyError, match=r"design\.sensitivity\.below: found 1e-09, which leaves too few positions"
+    ):
+        front(replace(of, design=tight))

@@ -6,7 +6,9 @@ import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from inercal.cli.options import (
     ClusterOption,
@@ -36,6 +38,12 @@ def design_positions(
     *,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
+    front: Annotated[
+        bool,
+        Parameter(
+            help="The tests to choose from by number of positions, u of the drift, and cost of tolerances."
+        ),
+    ] = False,
     overrides: Overrides = None,
     output: ResultOutput = ResultOutput(),
 ) -> int:
@@ -43,9 +51,12 @@ def design_positions(
     from inercal.foundation._files import write_text
     from inercal.systems.turntable import verbs as system
 
-    output.check((*WHOLE, ".csv"), (study,))
-    place = place_of(workers, cluster)
+    output.check(WHOLE if front else (*WHOLE, ".csv"), (study,))
     the_study, read_s = study_in("turntable", study, overrides, output)
+    if front:
+        with working(output) as progress:
+            return give(system.design_front(the_study, progress), output, read_s, "front")
+    place = place_of(workers, cluster)
     with working(output) as progress:
         designed = system.design(the_study, progress, place)
 

@@ -352,10 +352,15 @@ def _is_table(value: Any) -> bool:
 
 
 def _table(key: str, rows: Sequence[Mapping[str, Any]]) -> tuple[str, list[tuple[str, str]], list[list[str]]]:
-    """Title, columns (name and unit) and cells of rows of the result."""
+    """Title, columns (name and unit) and cells of rows of the result; what is nested in a row has no column."""
     title, _ = _labelled((key,))
-    heads = [_labelled((name,)) for name in rows[0]]
-    columns = [_column([_sized(name, row[name]) for row in rows]) for name in rows[0]]
+    names = [
+        name
+        for name, value in rows[0].items()
+        if not isinstance(value, dict) and not str(value).startswith("[[")
+    ]
+    heads = [_labelled((name,)) for name in names]
+    columns = [_column([_sized(name, row[name]) for row in rows]) for name in names]
     return title, heads, [list(cells) for cells in zip(*columns, strict=True)]
 
 

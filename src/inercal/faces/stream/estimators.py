@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from inercal.foundation._jit import compiling
@@ -76,6 +77,7 @@ def selfcal(
 ) -> Make:
     """Prepare a calibration of a platform row by row, to its end or until the goals are met. Raises `StudyError`."""
     from inercal.faces.stream.selfcal import Selfcal, filter_of, load_kernels
+    from inercal.systems.selfcal.before.next_turn import next_turns
     from inercal.systems.selfcal.filters.problem import problem
     from inercal.systems.selfcal.find_base import stated_well
     from inercal.systems.selfcal.reading import as_recorded
@@ -95,7 +97,9 @@ def selfcal(
 
     def estimator(lines: Lines) -> Selfcal:
         of_stream = as_recorded(lines.record, settings)
-        made = Selfcal(lines, problem(of_stream), interval, say_finding, of_stream.fixed, goal)
+        of_rows = problem(of_stream)
+        advise = partial(next_turns, of_stream, of_rows)
+        made = Selfcal(lines, of_rows, interval, say_finding, of_stream.fixed, goal, advise)
         say(_OF_A_STREAM)
         return made
 

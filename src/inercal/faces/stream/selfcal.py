@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType, ModuleType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.consistency import RunningNis
+from inercal.systems.selfcal.before.next_turn import NextTurns
 from inercal.systems.selfcal.filters.filter_result import (
     Estimates,
     FilterState,
@@ -46,6 +47,12 @@ _SETTLED = 50
 
 _SAID = 5
 """Gaps that are said."""
+
+_MISSED = 4
+"""Goals that are named, the worst first."""
+
+Advise: TypeAlias = Callable[[Array, Array, Array, Array], NextTurns | None]
+"""The next turns by coefficients (p,), their covariance (p, p), gimbal angles (3,) and goals (p,)."""
 
 _ALARMS = ("excess_scatter", "filter_fails", "gimbal_lock")
 
@@ -93,6 +100,8 @@ class Selfcal(SystemOnStream[SelfcalState]):
         Angle [rad] of the joints that are fixed and have no column, by name.
     goal : mapping
         Wanted standard uncertainty [SI] by name; where all are met a line is due, and `enough` says so.
+    advise : callable, optional
+        Gives the next turns; told where the platform comes to rest, or the stream ends, and a goal is missed.
     say : callable
         Told of gaps, of the first few; and once each when the innovations contradict the model, when the filter
         diverges, and when the gimbals lock.
@@ -115,6 +124,7 @@ class Selfcal(SystemOnStream[SelfcalState]):
         say: Callable[[Finding], None] = lambda _: None,
         fixed: Mapping[str, float] = MappingProxyType({}),
         goal: Mapping[str, float] = MappingProxyType({}),
+        advise: Advise | None = None,
     ) -> None:
         super().__init__(every, say)
         self._module, self._problem, self._where = filter_of(problem), problem, lines.where
@@ -127,6 +137,7 @@ class Selfcal(SystemOnStream[SelfcalState]):
         lines.leave_unsaid(first, rates)
         self._fixed = [(k, fixed[name]) for k, name in enumerate(wanted) if name in fixed]
         self._wanted = np.array([goal.get(name, math.inf) for name in problem.names])
+        self._advise = advise
         self._measured = sensor == "gyro"
         self._gained = np.array([column.increment for column in channels[:3]])
         self.columns = [f"{name} [{unit}]" for name, unit in [("t", "s"), *columns(problem.names)]]
@@ -167,6 +178,7 @@ class Selfcal(SystemOnStream[SelfcalState]):
         dt = sample.t - state.t
         if dt <= 0.0:
             return self._late(state, sample.t), ()
+        rests = self._turns(state.next) and bool(np.isfinite(following).all()) and not self._turns(following)
         state = self._seen(state, sample.t, dt)
         state, over, walked = self._rate(state, sample.t, over)
         doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
@@ -197,7 +209,35 @@ class Selfcal(SystemOnStream[SelfcalState]):
         if math.isfinite(nis):
             state = state._replace(nis=state.nis.after(nis, dims))
         self._judge(state, trace)
+        if rests:
+            self._say_next(state)
         return self._line(state, estimate, nis)
+
+    def ended(self, state: SelfcalState) -> Sequence[StreamRow]:
+        """Words on the goals that are missed; no line is held."""
+        self._say_next(state)
+        return ()
+
+    def _turns(self, rate: Array) -> bool:
+        """True where a rate (3,) [rad/s] is one of a turn."""
+        earth = float(np.linalg.norm(self._problem.world.earth))
+        return bool(np.abs(rate).max() > LIMITS.turning_ratio * earth)
+
+    def _say_next(self, state: SelfcalState) -> None:
+        """Say which goals are missed, and which turns meet them soonest."""
+        if self._advise is None or not state.begun or not np.isfinite(self._wanted).any():
+            return
+        estimate, p = estimate_of(state.filter, self._problem), len(self._wanted)
+        ratio = estimate.u[-1] / divisor(estimate.coefficients)[-1] / self._wanted
+        missed = [k for k in np.argsort(-ratio) if ratio[k] > 1.0]
+        if not missed:
+            return
+        covariance = state.filter.covariance[-p:, -p:]
+        turns = self._advise(state.filter.coefficients, covariance, state.filter.th, self._wanted)
+        text = ", ".join(f"{self._problem.names[k]} {ratio[k]:.2g}" for k in missed[:_MISSED])
+        more = f" and {len(missed) - _MISSED} more" if len(missed) > _MISSED else ""
+        headline = f"t = {state.t:.6g} s: u is more than its goal: {text} times{more}"
+        self.tell(Finding("goal_missed", headline, harm=(), action="" if turns is None else turns.sentence()))
 
     def enough(self, state: StreamState[SelfcalState]) -> str:
         """Words for a state in which all goals are met, and nothing contradicts the model; empty for others."""

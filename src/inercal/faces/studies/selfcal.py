@@ -15,7 +15,7 @@ from inercal.faces.studies.fields import Word
 from inercal.faces.studies.platform import CommandTable, GimbalsTable, plan_of
 from inercal.faces.studies.tables import Stated, replaced, settings_of, table_of
 from inercal.foundation._toml import check
-from inercal.foundation.errors import StudyError
+from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
@@ -73,7 +73,10 @@ def selfcal_study(data: Mapping[str, Any], path: str | Path) -> SelfcalSettings:
         settings_of(JointLimits, file.rig),
     )
     on_rig = settings_of(TrueErrors, file.disturbances).values
-    gating = settings_of(Gating, file.filter)
+    try:
+        gating = settings_of(Gating, file.filter)
+    except InputError as error:
+        raise StudyError(path, f"filter.{error}") from error
     filter = settings_of(Filter, file.filter, gating=None if gating.rule == "off" else gating)
     return settings_of(
         SelfcalSettings,

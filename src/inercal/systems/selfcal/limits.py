@@ -118,6 +118,9 @@ class Limits:
     turning_ratio: float = 2.0
     """Rate, over earth rate, from which the platform turns."""
 
+    gated_part: float = 0.5
+    """U without near-level gating over that with it, up to which gating is named as the cause of a lack."""
+
     turned_angle: float = math.radians(45.0)
     """Angle [rad] about an axis of p below which the platform hardly turned about it."""
 

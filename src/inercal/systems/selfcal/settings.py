@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
     REQUIRED,
@@ -42,6 +43,7 @@ from inercal.systems.selfcal.platform.states import (
 )
 
 _OF_A_SAMPLE = above_zero("a standard deviation of a sample")
+_TO_LEVEL = Bounds(lambda angle: 0.0 <= angle < 0.5 * math.pi, "an angle from 0 up to below 90 deg")
 _OF_A_TURN = Bounds(lambda angle: 0.0 < angle <= 2.0 * math.pi, "an angle above 0 and up to 360 deg")
 
 
@@ -123,8 +125,24 @@ class Gating:
     stops: Literal["accelerometers", "step"] = option(
         "what gating stops: the accelerometers, or the whole update", "accelerometers", name="gating_stops"
     )
-    near: float = float(np.radians(2.0))
-    far: float = float(np.radians(5.0))
+    near: float = quantity(
+        "an accelerometer within this of level is near it",
+        "angle",
+        "2 deg",
+        bounds=_TO_LEVEL,
+        name="gating_near",
+    )
+    far: float = quantity(
+        "and until it is further off than this", "angle", "5 deg", bounds=_TO_LEVEL, name="gating_far"
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse angles out of order."""
+        if not self.near <= self.far:
+            found = f"found {math.degrees(self.far):.6g} deg"
+            raise InputError(
+                "gating_far", f"{found}, expected at least gating_near, {math.degrees(self.near):.6g} deg"
+            )
 
 
 @dataclass(frozen=True)

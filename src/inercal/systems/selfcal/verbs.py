@@ -61,7 +61,10 @@ def _one(calibration: task.Calibration, courses: bool) -> Result:
         return figures.page(calibration)
 
     def more() -> list[str]:
-        return [f"{table.title}\n{table.text()}" for table in task.compared(calibration)]
+        listed = [f"{table.title}\n{table.text()}" for table in task.compared(calibration)]
+        if listed and calibration.recording.reference is None:
+            listed.append("The record has no true attitude, q_ref_0 .. q_ref_3, to set the filters against.")
+        return listed
 
     def rows() -> Record:
         return history_record(calibration.filtered, calibration.recording, calibration.problem.world)

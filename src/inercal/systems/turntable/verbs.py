@@ -86,6 +86,31 @@ def design(study: Study, progress: Progress = lambda _: None, executor: Executor
     return Result(result, View(result, words, lambda: [designed.table()], page, picture), designed)
 
 
+def design_front(study: Study, progress: Progress = lambda _: None) -> Result:
+    """Find the tests among which to choose by number of positions, u of the drift, and cost of tolerances.
+
+    ``evidence`` is the `inercal.systems.turntable.positions.front.Front`.
+    """
+    from inercal.systems.turntable.figures import front as figures
+    from inercal.systems.turntable.positions.front import front
+    from inercal.systems.turntable.positions.tolerance_design import REFERENCES
+
+    found, result = designed_by(
+        "design positions", study, lambda: front(study.settings, progress), REFERENCES
+    )
+
+    def page() -> str:
+        return figures.page(found, study.settings, result)
+
+    def picture() -> Picture:
+        return figures.main(found, study.settings)
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in figures.tables(found, study.settings)]
+
+    return Result(result, View(result, found.message, tables, page, picture), found)
+
+
 def design_tolerances(study: Study, progress: Progress = lambda _: None) -> Result:
     """Find the cheapest tolerances that reach the goals of the study.
 

@@ -30,15 +30,18 @@ _ORDER = 4
 
 MEASURED = (
     Methods(),
-    Methods(static="complementary"),
-    Methods(static="segmented"),
     Methods(centrifugal="low-pass"),
     Methods(centrifugal="decision"),
     Methods(tangential="differentiated"),
     Methods(tangential="none"),
+    Methods(static="complementary", tangential="none"),
+    Methods(static="segmented", tangential="none"),
     Methods(centrifugal="none", tangential="none"),
 )
-"""Methods of a comparison, the paper's own choice first."""
+"""Methods of a comparison, the paper's own choice first.
+
+The static ways are set side by side without the dual pair, with which complementary and improved coincide in motion.
+"""
 
 
 def label(methods: Methods) -> str:

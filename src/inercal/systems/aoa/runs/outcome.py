@@ -18,6 +18,7 @@ from inercal.foundation.results.shown import Table, heads, rounded, short
 from inercal.systems.aoa.layout import centrifugal_arms, pair_weights, tangential_arms
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper import residuals
+from inercal.systems.aoa.reading.recording import usual_step
 from inercal.systems.aoa.result.outcome import COMMAND, REFERENCES
 from inercal.systems.aoa.result.points import Point
 from inercal.systems.aoa.runs.run_table import Role, Run, RunTable
@@ -139,15 +140,16 @@ def _oscillation(group: Sequence[tuple[float, float, Measurement]]) -> Oscillati
             if math.isfinite(errors.all.rms):
                 squares.setdefault(name, []).append(errors.all.rms**2)
     rms = {name: math.sqrt(float(np.mean(each))) for name, each in squares.items()}
-    terms = error_terms(group[0][2].settings, amplitude, frequency)
+    first = group[0][2]
+    terms = error_terms(first.settings, amplitude, frequency, usual_step(first.recording.t))
     return OscillationRuns(amplitude, frequency, len(group), terms, rms)
 
 
-def error_terms(settings: AoaSettings, amplitude: float, frequency: float) -> dict[str, float]:
+def error_terms(settings: AoaSettings, amplitude: float, frequency: float, step: float) -> dict[str, float]:
     """Errors of the angle [rad], at most, by what the paper's ways leave of the lever-arm terms of a sine.
 
     Of the axes with the longest arms, at the angle where all of it counts, a residual over gravity; the sensors err by
-    their stated noise of a sample and bias.
+    their stated noise of a sample and bias, and the gyro is read at intervals of ``step`` [s].
     """
     noise, layout, level = settings.noise, settings.layout, settings.attitude.level
     dA, dw = (
@@ -157,10 +159,13 @@ def error_terms(settings: AoaSettings, amplitude: float, frequency: float) -> di
     X = 2.0 * math.pi * frequency * amplitude
     r = float(np.abs(centrifugal_arms(layout, level)).max())
     p = float(np.abs(tangential_arms(layout, level)).max())
+    low_pass, mechanical = residuals.low_pass(r, X), residuals.mechanical(r, X, dw)
     left = {
-        "centrifugal, low pass": residuals.low_pass(r, X),
-        "centrifugal, mechanical": residuals.mechanical(r, X, dw),
+        "centrifugal, low pass": low_pass,
+        "centrifugal, mechanical": mechanical,
+        "centrifugal, decision": min(low_pass, mechanical),
         "tangential, none": p * residuals.untreated(X, frequency),
+        "tangential, differentiated": p * residuals.differentiated(noise.gyro / abs(level), 1.0 / step),
     }
     weights = pair_weights(layout, level)
     if weights is not None:

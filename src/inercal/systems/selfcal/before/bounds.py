@@ -109,19 +109,23 @@ def bounds(
     history: bool = False,
     contributions: bool = False,
     warm: Array | None = None,
+    known: Array | None = None,
 ) -> PathBounds:
     """Bounds along a commanded motion, with noise, prior and near-level gate of the problem.
 
     ``truth`` (p,) or longer, product form, makes the path, the nominal one if absent; ``measured`` (n, 4) rows that
     accelerometers x, y, z and the encoders measure, all if absent. The first row's accelerometers play no part.
-    ``warm`` (n,) [K] above the temperature of the coefficients, 0 if absent.
+    ``warm`` (n,) [K] above the temperature of the coefficients, 0 if absent. ``known`` (p, p) is their covariance at
+    the start, linear form, in the place of the prior.
     """
     c = problem.mean if truth is None else to_linear(truth[problem.states.index])
     n, rate, dt = len(motion.t), motion.rate, np.diff(motion.t)
     q = nominal_attitudes(motion, problem, c, warm)
     above = np.zeros(n) if warm is None else warm
     seen = np.ones((n, 4), dtype=np.bool_) if measured is None else measured
-    return _along(Path(q, motion.angles, dt, rate, seen, above), c, problem, history, contributions)
+    return _along(
+        Path(q, motion.angles, dt, rate, seen, above), c, problem, history, contributions, known=known
+    )
 
 
 def nominal_attitudes(motion: CommandedMotion, problem: FilterProblem, c: Array, warm: Array | None) -> Array:
@@ -166,9 +170,10 @@ def _along(
     contributions: bool,
     restarts: Sequence[int] = (),
     walked: Array | None = None,
+    known: Array | None = None,
 ) -> PathBounds:
     """Bounds along a path with coefficients (p,), linear form; ``walked`` (n - 1,) factors of the variance of the angle
-    random walk in each step."""
+    random walk in each step; ``known`` as of `bounds`."""
     q, th, dt, rate, seen, warm = whole_path
     p, noise = len(c), problem.noise
     u = np.empty((len(q) if history else 0, p))
@@ -176,6 +181,8 @@ def _along(
     start[0, :3], start[1, 3:] = noise.encoder**2, problem.prior**2
     P = np.zeros((1 + len(SOURCES) if contributions else 1, 3 + p, 3 + p))
     P[0] = np.diag(start[0] + start[1])
+    if known is not None:
+        P[0, 3:, 3:] = known
     if contributions:
         P[3], P[4] = np.diag(start[0]), np.diag(start[1])
     if len(rate):

@@ -19,7 +19,7 @@ from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, combine
 from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, reached, singular
 from inercal.foundation.results.result import Estimate
-from inercal.systems.selfcal.before.bounds import PathBounds
+from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.before.observability import Observability, not_positive, observability, useless
 from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of
 from inercal.systems.selfcal.estimators import ESTIMATORS, FACTOR_OF
@@ -143,7 +143,7 @@ def assemble(
     hidden = _hidden(judged, u / bounds.prior, uncertainty.budget)
     result["at_prior"] = [name for name in filtered.names if name in {*judged.at_prior, *hidden}]
     result["goal"] = reached(filtered.names, u, settings.goal)
-    hints = _hardly_turned(recording, settings)
+    hints = _hardly_turned(recording, settings) | _gated(recording, settings, filtered, bounds)
     # of biases that walk no recording tells more
     left = {name: part for name, part in judged.at_prior.items() if KIND_OF[name] not in BIAS_WALK}
     all_findings += at_prior(left, hints)
@@ -212,7 +212,8 @@ def verdict(
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
     limit = _limit(agreement, passed, settings)
-    return _verdict(observability(bounds, {}), agreement, limit, cause, _hardly_turned(recording, settings))
+    hints = _hardly_turned(recording, settings) | _gated(recording, settings, filtered, bounds)
+    return _verdict(observability(bounds, {}), agreement, limit, cause, hints)
 
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
@@ -277,6 +278,28 @@ def _hardly_turned(recording: Recording, settings: SelfcalSettings) -> dict[str,
             )
             words |= dict.fromkeys(coefficients, text)
     return words
+
+
+def _gated(
+    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, bounds: PathBounds
+) -> dict[str, str]:
+    """Coefficients that the rows show which near-level gating leaves out -> advice."""
+    if settings.filter.gating is None or filtered.history is None:
+        return {}
+    free = problem(replace(settings, filter=replace(settings.filter, gating=None)))
+    whole = recorded_bounds(
+        recording, free, filtered.history.attitude, filtered.coefficients, restarts=filtered.restarts
+    )
+    text = (
+        "near-level gating leaves out the rows that show it, without it u is {:.2g} of this: set filter.gating to off, "
+        "or narrow filter.gating_near"
+    )
+    ratio = whole.u / bounds.u
+    return {
+        name: text.format(part)
+        for name, part in zip(bounds.names, ratio, strict=True)
+        if part < LIMITS.gated_part
+    }
 
 
 def _hidden(

@@ -135,7 +135,7 @@ def design(
     criterion = _criterion(asked.criterion, model)
     if asked.constraint is not None:
         progress("computing the indices of the candidates")
-        indices = _largest_index(settings)
+        indices = largest_index(settings)
         allowed = mask & insensitive(
             everywhere, np.where(mask, indices, np.nan), asked.constraint.below, asked.positions
         )
@@ -272,7 +272,7 @@ def _criterion(name: str, model: TableModel) -> Criterion:
     return i_criterion(sphere_rows(model))
 
 
-def _largest_index(settings: TurntableSettings) -> Array:
+def largest_index(settings: TurntableSettings) -> Array:
     """Largest first-order index (m,) of the constrained factors on the constrained outputs."""
     from inercal.foundation.sensitivities import exact
 

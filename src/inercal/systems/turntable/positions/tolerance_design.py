@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.criteria import a_criterion
@@ -185,8 +186,9 @@ def design_tolerances(
             tried.append(_bought(test, settings, own))
     size = np.ones(len(own))
     for _ in range(2):  # for the tolerances as they are, then for those found
-        searched = _searched(settings, model, size, progress)
-        test = None if searched is None else trial(searched, settings, model, goal)
+        progress(f"searching {settings.design.positions} positions")
+        found = searched(settings, model, size)
+        test = None if found is None else trial(found, settings, model, goal)
         if test is None:
             break
         tried.append(_bought(test, settings, own))
@@ -270,12 +272,12 @@ def _bought(test: Trial, settings: TurntableSettings, prices: Sequence[Price]) -
             return best
 
 
-def _searched(
-    settings: TurntableSettings, model: TableModel, x: Array, progress: Callable[[str], None]
+def searched(
+    settings: TurntableSettings, model: TableModel, x: Array, allowed: NDArray[np.bool_] | None = None
 ) -> Plan | None:
-    """The positions that are best for the goals with tolerances of these factors; None where too few are allowed."""
+    """The positions that are best for the goals with tolerances of factors ``x`` (k,), of the candidates that are
+    ``allowed`` (m,), by the limits of the joints if absent; None where these are too few."""
     asked, chain = settings.design, settings.chain
-    progress(f"searching {asked.positions} positions")
     changed = chain.with_errors(
         *(
             replace(error, distribution=error.distribution.scaled(float(by)))
@@ -285,7 +287,11 @@ def _searched(
     c = expected_coefficients(settings, model)
     candidates = candidates_of(replace(model, chain=changed), asked.candidates.angles, c, settings, True)
     criterion = a_criterion(np.vstack(_wanted(model, c, settings.tolerances.goal)))
-    mask = within(asked.candidates.angles, [settings.limits.get(joint) for joint in chain.joints])
+    mask = (
+        within(asked.candidates.angles, [settings.limits.get(joint) for joint in chain.joints])
+        if allowed is None
+        else allowed
+    )
     rng = np.random.default_rng(asked.seed)
     try:
         choice = exchange(candidates, asked.positions, criterion, rng, allowed=mask)
