@@ -150,7 +150,7 @@ def test_houses_stand_on_each_other():
         ("inercal.faces.python.calibrations", "inercal.laboratory.certificate.reading"),
         # the jobs of a workbench are commands
         ("inercal.bench.workbench.child", "inercal.cli"),
-        ("inercal.bench.workbench.stored_jobs", "inercal.cli.stored_line"),
+        ("inercal.bench.workbench.jobs", "inercal.cli.stored_line"),
     }
     up = [
         f"{module} imports {other}"
@@ -199,7 +199,7 @@ WITHIN = {
     ),
     "strapdown": "limits model settings simulate reading fit before result task figures verbs system",
     "turntable": (
-        "limits settings judged model weights second_order regression readings display sensitivity sensitivity_maps "
+        "limits settings judged model weights regression readings display sensitivity sensitivity_maps "
         "positions rate step_response step_test simulate task figures verbs system"
     ),
     "aoa": (
@@ -297,6 +297,7 @@ def test_modules_can_be_read_in_one_go():
 #: what `tests/counts.py` counts; lowered when an issue is done
 CEILINGS = {
 <<<<<<< HEAD
+<<<<<<< HEAD
     "names used across folders": 1510,
     "class names shared": 5,
     "constants outside Limits": 449,
@@ -306,6 +307,12 @@ CEILINGS = {
     "constants outside Limits": 450,
 >>>>>>> papers48
     "modules": 665,
+=======
+    "names used across folders": 1504,
+    "class names shared": 5,
+    "constants outside Limits": 448,
+    "modules": 654,
+>>>>>>> rooms43
 }
 
 

@@ -9,8 +9,7 @@ from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.rigs.plans import NAMED
 from inercal.foundation.rigs.tables import slots
 from inercal.systems.turntable.display import tolerances
-from inercal.systems.turntable.positions.calibration import PositionCalibration
-from inercal.systems.turntable.task import calibrate, simulate
+from inercal.systems.turntable.task import PositionCalibration, calibrate, simulate
 
 #: unit in the table of terms -> a usual size and its unit, by kind of output
 _SIZES = {

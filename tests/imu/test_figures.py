@@ -16,7 +16,7 @@ from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu import figures
-from inercal.systems.imu.figures import main, page, pictures
+from inercal.systems.imu.figures import page, pictures
 from inercal.systems.imu.multiposition.calibration import calibrate_multiposition as calibrate
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, simulate
@@ -68,7 +68,7 @@ def test_a_sound_calibration(xsens, g_sensitivity):
 @pytest.mark.slow
 def test_the_main_picture_comes_first_and_is_a_figure_too(xsens):
     calibration = calibrate(xsens, replace(SETTINGS, g_sensitivity=True))
-    shown = main(calibration)
+    shown = pictures(calibration)[0]
     assert shown == figures.pictures(calibration)[0]
     assert shown.figure.axes
     text = page(calibration)

@@ -16,9 +16,8 @@ from inercal.foundation.records.channels import misfit
 from inercal.foundation.records.record import record_of
 from inercal.foundation.rigs.plans import grid, named
 from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
-from inercal.systems.turntable.positions.calibration import calibrate_positions
 from inercal.systems.turntable.settings import RateTest
-from inercal.systems.turntable.task import calibrate
+from inercal.systems.turntable.task import calibrate, calibrate_positions
 
 PLAN = grid((6, 6))
 PER_RATE = 1e-4 / DEG_H  # 0.1 mA/(deg/h), in A/(rad/s)

@@ -15,9 +15,8 @@ from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.records.record import record_of
 from inercal.foundation.rigs.plans import grid
 from inercal.foundation.units import STANDARD_GRAVITY, parse_unit
-from inercal.systems.turntable.positions.calibration import calibrate_positions
 from inercal.systems.turntable.settings import RateTest
-from inercal.systems.turntable.task import simulate
+from inercal.systems.turntable.task import calibrate_positions, simulate
 
 PLAN = grid((6, 6))
 PRODUCTS = ("xx", "yy", "xy", "xz", "yz")

@@ -15,7 +15,7 @@ from inercal.foundation.results.repeat import combine_runs
 from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.positions.calibration import calibrate_positions
+from inercal.systems.turntable.task import calibrate_positions
 
 NOISE, TURN_ON = 0.01 * DEG_H, 0.2 * DEG_H
 REDRAWN, CONSTANT = ("dphi_y1", "dalpha_x2"), ("deps_y", "dtheta_z")

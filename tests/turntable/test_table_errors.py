@@ -21,10 +21,10 @@ from inercal.foundation.rigs.plans import listed
 from inercal.systems.turntable.model import table_model
 from inercal.systems.turntable.positions.tolerance import shifts
 from inercal.systems.turntable.regression import fit
-from inercal.systems.turntable.second_order import second_order
 from inercal.systems.turntable.sensitivity import analyse
 from inercal.systems.turntable.simulate import simulate_positions, simulate_rate_test, truth
 from inercal.systems.turntable.task import calibrate
+from inercal.systems.turntable.weights import second_order
 
 RUNS = 8
 

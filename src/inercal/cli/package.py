@@ -125,8 +125,7 @@ def _new(
 
 def validate(*, output: ResultOutput = ResultOutput()) -> int:
     """Rerun the published and closed-form cases."""
-    from inercal.faces.report.validation import page, table
-    from inercal.faces.validate.run import executor
+    from inercal.faces.validate.run import executor, page, table
     from inercal.faces.validate.run import validate as run
     from inercal.foundation._jit import compiling
 

@@ -340,7 +340,7 @@ def check_version(engine: Engine, where: str) -> None:
         )
 
 
-def migrate(engine: Engine, where: str, version: str = VERSION) -> None:
+def migrate(engine: Engine, where: str) -> None:
     """Bring the tables to a version, all steps or none; raises `InputError`."""
     from alembic import command
     from alembic.config import Config
@@ -349,7 +349,7 @@ def migrate(engine: Engine, where: str, version: str = VERSION) -> None:
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
     with writing(engine, where) as connection:
         config.attributes["connection"] = connection
-        command.upgrade(config, version)
+        command.upgrade(config, VERSION)
 
 
 def numbered(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -19,7 +17,7 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.instruments.terms import term
 from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.result import Estimate
-from inercal.foundation.results.shown import aligned, rounded
+from inercal.foundation.results.shown import aligned, csv_text, rounded
 from inercal.laboratory.history import REFERENCES, YEAR, Course, History, Mask
 from inercal.laboratory.limits import LIMITS
 from inercal.laboratory.specification import group_of
@@ -148,44 +146,23 @@ def table(history: History) -> str:
 
 def rows_csv(history: History) -> str:
     """A CSV line for each coefficient of each calibration."""
-    out = io.StringIO()
-    names = (
-        "date",
-        "result",
-        "coefficient",
-        "value",
-        "u",
-        "U",
-        "unit",
-        "E_n",
-        "low",
-        "high",
-        "ewma",
-        "ewma_limit",
-    )
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(names)
+    head = "date result coefficient value u U unit E_n low high ewma ewma_limit"
+    lines: list[Sequence[object]] = [head.split()]
     for course in history.courses:
-        chart = course.chart
-        for k, day in enumerate(course.dates):
-            numbers = (course.series.y[k], course.series.u[k], course.U[k])
-            more = (course.E_n[k], chart.low[k], chart.high[k], chart.ewma[k], chart.ewma_limit[k])
-            writer.writerow(
-                [
-                    day.isoformat(),
-                    course.ids[k],
-                    course.name,
-                    *map(_cell, numbers),
-                    course.unit,
-                    *map(_cell, more),
-                ]
-            )
-    return out.getvalue()
-
-
-def _cell(value: float) -> str:
-    """A number with all its digits, or an empty cell."""
-    return "" if np.isnan(value) else repr(float(value))
+        chart, series = course.chart, course.series
+        numbers = (
+            series.y,
+            series.u,
+            course.U,
+            course.E_n,
+            chart.low,
+            chart.high,
+            chart.ewma,
+            chart.ewma_limit,
+        )
+        for day, identity, y, u, U, *more in zip(course.dates, course.ids, *numbers, strict=True):
+            lines.append((day.isoformat(), identity, course.name, y, u, U, course.unit, *more))
+    return csv_text(lines)
 
 
 _COLUMNS = 150

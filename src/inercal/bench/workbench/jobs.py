@@ -21,7 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from inercal.bench.workbench.sessions import is_numbered
+from inercal.bench.workbench.sessions import PART, is_numbered
 from inercal.foundation._files import is_pipe, read_bytes, write_text
 from inercal.foundation.addresses import shown_address
 from inercal.foundation.errors import InercalError, InputError, plain, spelt
@@ -210,9 +210,7 @@ class Queue:
 
     def _check(self, job: Job) -> None:
         """Refuse a job that was found and is not to be run; raises `InputError`."""
-        from inercal.bench.workbench.stored_jobs import check_stored
-
-        check_stored(job.arguments, job.where, self.root.parent, job.folder)
+        _check_stored(job.arguments, job.where, self.root.parent, job.folder)
 
     def _seen(self, job: Job) -> Job:
         """A job that was found, refused where it waits and is not to be run."""
@@ -348,3 +346,38 @@ def _found(folder: Path) -> Job | None:
     if state is JobState.WAITING and [session, where, made, *words] != texts:
         return _refused(job, ValueError("found a text that no command can have, expected plain text"))
     return job
+
+
+def _check_stored(arguments: tuple[str, ...], where: Path, work: Path, own: Path) -> None:
+    """Refuse a command line that was found in a work folder, where anybody may have written it, and leads elsewhere.
+
+    It is held against the lists of `inercal.cli.stored_line`; files come from the folder ``work``, and go to that of
+    the job, ``own``; ``where`` it is run. Raises `InputError`, naming the word.
+    """
+    from inercal.cli.stored_line import stored_line
+    from inercal.laboratory.again import LaidOut
+
+    line = stored_line(list(arguments))
+    inside, files = _is_inside(where, work), {}
+    for name, values in line.given.items():
+        use = line.use(name)
+        if use == "dropped" and name not in ("--json", "--quiet"):
+            raise InputError(
+                name, "found in a job of an earlier workbench, expected options that only compute"
+            )
+        for value in values:
+            if use == "below" and not _is_inside(where / value, own):
+                raise InputError(value, "lies outside the folder of the job, expected a file in it")
+            if use == "file":
+                inside = inside and _is_inside(where / str(value), work)
+                files[os.path.normpath(str(value))] = os.path.normpath(str(value))
+            if not inside:
+                raise InputError(value, "lies outside the work folder, expected a file in it")
+    if any(path.suffix != PART for path in where.glob(".*")):
+        raise InputError(where, "holds a hidden file, as settings of other programs are, expected none")
+    line.check_named(LaidOut(work.resolve(), where, files))
+
+
+def _is_inside(path: Path, folder: Path) -> bool:
+    """True for a place in a folder, links followed."""
+    return path.resolve().is_relative_to(folder.resolve())

@@ -29,7 +29,6 @@ class InUse:
 
     model: CalibratedInstrument
     span: tuple[float, float, str] | None
-    of_platform: bool = False
 
     def correction(self, record: Record, invert: bool = False) -> Correction:
         """The correction of the model; raises `InputError` as that does."""
@@ -50,7 +49,7 @@ def model_of(estimate: Estimate, where: object = "calibration", uncertainty: boo
         model = make(estimate)
     else:
         model = uncertain(make, table_result.with_stated(estimate), where)
-    return InUse(model, temperature_range(estimate), estimate.command == platform.COMMAND)
+    return InUse(model, temperature_range(estimate))
 
 
 def worth_knowing(estimate: Estimate, where: object = "calibration") -> tuple[Finding, ...]:

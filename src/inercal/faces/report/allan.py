@@ -18,7 +18,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.noise import BIAS_FLOOR, SYMBOLS
 from inercal.foundation.instruments.terms import NOISE_TERMS, noise_shown
 from inercal.foundation.noise.outcome import ChannelNoise, NoiseResult
-from inercal.foundation.results.shown import aligned, rounded
+from inercal.foundation.results.shown import aligned, csv_text, rounded
 from inercal.foundation.units import parse_unit
 
 #: symbol -> averaging time [s] at which it is read off its slope, the slope in words, the slope's colour
@@ -96,13 +96,11 @@ def table(noise: NoiseResult) -> str:
 
 def curves_csv(noise: NoiseResult) -> str:
     """The curves as CSV, one row for each channel and averaging time, in SI."""
-    lines = ["channel,unit,tau [s],deviation,lower,upper,fitted"]
+    lines: list[Sequence[object]] = [("channel", "unit", "tau [s]", "deviation", "lower", "upper", "fitted")]
     for channel in noise.channels:
-        tau = channel.curve.tau
-        for row in zip(tau, channel.deviation, *channel.limits, channel.fitted, strict=True):
-            numbers = ("" if np.isnan(x) else repr(float(x)) for x in row)
-            lines.append(",".join([channel.name, channel.unit, *numbers]))
-    return "\n".join(lines) + "\n"
+        numbers = (channel.curve.tau, channel.deviation, *channel.limits, channel.fitted)
+        lines += [(channel.name, channel.unit, *row) for row in zip(*numbers, strict=True)]
+    return csv_text(lines)
 
 
 def pictures(noise: NoiseResult) -> list[Picture]:

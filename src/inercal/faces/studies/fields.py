@@ -166,9 +166,6 @@ def _in_si(quantity: Quantity) -> str:
     return f"{quantity.value:.6g} {quantity.unit.si}".removesuffix(" 1")
 
 
-Duration = Annotated[Quantity, QuantityText("time", "50 s", positive, "a time above zero")]
-"""A time above zero."""
-
 Temperature = Annotated[
     Quantity,
     QuantityText("temperature", "23 degC", lambda t: t > -273.15, "a temperature above absolute zero"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -122,17 +123,19 @@ def _one(rng: np.random.Generator, noise: float, known: bool) -> dict[str, Array
 
 _ARCSEC = np.radians(1.0 / 3600.0)
 _DEG_PER_H = parse_unit("deg/h").factor
-_WHEEL = {f"DX_{name}": value * _DEG_PER_H for name, value in DRIFT.items()} | {
+WHEEL = {f"DX_{name}": value * _DEG_PER_H for name, value in DRIFT.items()} | {
     "k_x": 1.01,
     "k_y": -0.02,
     "k_z": 0.01,
 }
+"""Axis X of a gyrowheel."""
+
 _SIZE = {"k": 1.0, "D": 50.0 * _DEG_PER_H}
 
 
 def _perfect() -> TurntableSettings:
     """A study of one axis of the gyrowheel on a table without errors, with next to no noise."""
-    return replace(settings_of(_WHEEL, 1e-6, np.radians(39.1)), chain=turntable(TABLE, None))
+    return replace(settings_of(WHEEL, 1e-6, np.radians(39.1)), chain=turntable(TABLE, None))
 
 
 def _noiseless(settings: TurntableSettings) -> TurntableSettings:
@@ -140,9 +143,9 @@ def _noiseless(settings: TurntableSettings) -> TurntableSettings:
     return replace(settings, instrument=replace(settings.instrument, noise=None))
 
 
-def _off(estimate: Estimate) -> dict[str, float]:
-    """Coefficients less the true ones, over the sizes of their kinds: 1 and 50 deg/h."""
-    return {name: (estimate[name].value - true) / _SIZE[name[0]] for name, true in _WHEEL.items()}
+def off(estimate: Estimate, wheel: Mapping[str, float]) -> dict[str, float]:
+    """Coefficients less the true ones of a ``wheel``, over the sizes of their kinds: 1 and 50 deg/h."""
+    return {name: (estimate[name].value - true) / _SIZE[name[0]] for name, true in wheel.items()}
 
 
 _RAMP = 0.3 * _DEG_PER_H
@@ -154,9 +157,9 @@ def _drift() -> list[float]:
     real = replace(_noiseless(settings), disturbances=Disturbances(ramp=_RAMP))
     fitted = replace(settings, instrument=replace(settings.instrument, bias_drift="linear"))
     estimate = calibrate(simulate_positions(real, np.random.default_rng(1)), fitted).estimate
-    off = _off(estimate)
-    off["DX_F"] -= 0.5 * _RAMP / _SIZE["D"]
-    return [estimate.result["nuisances"][0]["value"] / _RAMP, *off.values()]
+    errors = off(estimate, WHEEL)
+    errors["DX_F"] -= 0.5 * _RAMP / _SIZE["D"]
+    return [estimate.result["nuisances"][0]["value"] / _RAMP, *errors.values()]
 
 
 _POSITIONS, _NOISE, _AMPLITUDE, _GRAVITY = 12, 1e-4, 20.0 * _ARCSEC, 9.8
@@ -229,7 +232,7 @@ def _measured() -> list[float]:
     for k, name in enumerate(("phi1", "phi2")):
         record[name].values[:] = np.degrees(commanded[:, k])
     settings = turntable_study(tomllib.loads(_MEASURED), Path("study.toml"))
-    return list(_off(calibrate(record, settings).estimate).values())
+    return list(off(calibrate(record, settings).estimate, WHEEL).values())
 
 
 _FULL, _CURVE = np.radians(100.0), 1e-6

@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inercal.faces.validate.case import Case
-from inercal.faces.validate.table import TABLE, TABLE_CASES, one_turntable_calibration, settings_of
+from inercal.faces.validate.table import (
+    TABLE,
+    TABLE_CASES,
+    WHEEL,
+    off,
+    one_turntable_calibration,
+    settings_of,
+)
 from inercal.foundation.arrays import Array
 from inercal.foundation.designs.criteria import basis, in_basis
 from inercal.foundation.rigs.outputs import gravity_reference, table_outputs
@@ -83,24 +90,30 @@ def _icosahedron() -> list[float]:
 
 
 _DEG_PER_H = parse_unit("deg/h").factor
-_WHEEL = {
-    "k_x": 1.01, "k_y": -0.02, "k_z": 0.01, "kY_x": 0.015, "kY_y": 0.99, "kY_z": -0.01,
-    **{f"DX_{name}": value * _DEG_PER_H for name, value in {
-        "F": 50.0, "X": 60.0, "Y": 40.0, "Z": 8.0, "XX": 2.0, "YY": 1.5, "XY": 1.0, "XZ": 3.0, "YZ": 2.5}.items()},
-    **{f"DY_{name}": value * _DEG_PER_H for name, value in {
-        "F": -20.0, "X": 35.0, "Y": -55.0, "Z": 5.0, "XX": -1.0, "YY": 2.5, "XY": 2.0, "XZ": -1.5, "YZ": 3.5}.items()},
-}  # fmt: skip
+_DRIFT_Y = {
+    "F": -20.0,
+    "X": 35.0,
+    "Y": -55.0,
+    "Z": 5.0,
+    "XX": -1.0,
+    "YY": 2.5,
+    "XY": 2.0,
+    "XZ": -1.5,
+    "YZ": 3.5,
+}
+_BOTH_AXES = {
+    **WHEEL,
+    **{"kY_x": 0.015, "kY_y": 0.99, "kY_z": -0.01},
+    **{f"DY_{name}": value * _DEG_PER_H for name, value in _DRIFT_Y.items()},
+}
 
 
 def _without_errors() -> list[float]:
-    """Coefficients of a gyrowheel on a perfect table without noise, less the true ones, over the sizes of their kinds:
-    1 and 50 deg/h."""
+    """Coefficients of a gyrowheel on a perfect table without noise, less the true ones, over their sizes."""
     latitude = np.radians(39.1)
-    perfect = replace(settings_of(_WHEEL, None, latitude), chain=turntable(TABLE, None))
-    settings = settings_of({}, 1e-6, latitude)
-    estimate = calibrate(simulate_positions(perfect, np.random.default_rng(1)), settings).estimate
-    size = {"k": 1.0, "D": 50.0 * _DEG_PER_H}
-    return [(estimate[name].value - true) / size[name[0]] for name, true in _WHEEL.items()]
+    perfect = replace(settings_of(_BOTH_AXES, None, latitude), chain=turntable(TABLE, None))
+    record = simulate_positions(perfect, np.random.default_rng(1))
+    return list(off(calibrate(record, settings_of({}, 1e-6, latitude)).estimate, _BOTH_AXES).values())
 
 
 _RUNS = 20

@@ -6,8 +6,10 @@ printed by a command, and shown on a page.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
@@ -50,6 +52,16 @@ def aligned(rows: Sequence[Sequence[str]], words: Container[int] = (0,), between
         ).rstrip()
         for row in rows
     ]
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Rows as CSV: numbers with all their digits, an empty cell for None and NaN."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for row in rows:
+        cells = (float(cell) if isinstance(cell, np.floating) else cell for cell in row)
+        writer.writerow(["" if cell is None or cell != cell else cell for cell in cells])
+    return text.getvalue()
 
 
 def heads(*texts: str) -> tuple[tuple[str, str], ...]:

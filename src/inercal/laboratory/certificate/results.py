@@ -36,10 +36,9 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from inercal.faces.studies.laboratory import EquipmentTable
-    from inercal.foundation.results.result import Estimate, Parameter
+    from inercal.foundation.results.result import Parameter
     from inercal.foundation.units import Quantity
     from inercal.laboratory.certificate.lab import LabFile
-    from inercal.laboratory.specification import Conformity
 
 
 def limits_used(specification: Specification, estimates: Sequence[Estimate], where: object) -> None:

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from inercal.faces.studies.laboratory import AddressTable
-    from inercal.laboratory.certificate.lab import LabFile
 
 
 GENERAL = (

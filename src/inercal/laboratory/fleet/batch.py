@@ -6,8 +6,6 @@ unit.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import closing
@@ -27,6 +25,7 @@ from inercal.foundation.findings import Status
 from inercal.foundation.results.basis import Basis, provenance
 from inercal.foundation.results.files import save
 from inercal.foundation.results.result import Estimate
+from inercal.foundation.results.shown import csv_text
 from inercal.laboratory.fleet.fleet import Fleet, fleet_of
 from inercal.laboratory.fleet.manifest import FleetUnit, read_manifest
 from inercal.laboratory.fleet.page import page, pictures, result_of, summary, table
@@ -65,14 +64,7 @@ def columns(rows: Sequence[UnitRow]) -> dict[str, list[Any]]:
 def as_csv(rows: Sequence[UnitRow]) -> str:
     """The table as CSV: numbers in full, empty cells where there are none."""
     found = columns(rows)
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(found)
-    for cells in zip(*found.values(), strict=True):
-        writer.writerow(
-            ["" if cell is None else repr(cell) if isinstance(cell, float) else cell for cell in cells]
-        )
-    return out.getvalue()
+    return csv_text([found, *zip(*found.values(), strict=True)])
 
 
 def write_parquet(rows: Sequence[UnitRow], path: Path) -> None:

@@ -17,11 +17,6 @@ if TYPE_CHECKING:
     AnyCalibration: TypeAlias = MultipositionCalibration | AidedCalibration | CalibrationFromSections
 
 
-def main(calibration: AnyCalibration) -> Picture:
-    """The picture that answers the question: the poses, the sections or the test, and what the fit leaves over."""
-    return pictures(calibration)[0]
-
-
 def pictures(calibration: AnyCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first."""
     match calibration:

@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from inercal.systems.strapdown.task import StrapdownCalibration
 
 
-def main(calibration: StrapdownCalibration) -> Picture:
-    """The picture that answers the question: what each turn leaves over, or where there were rests."""
-    return pictures(calibration)[0]
-
-
 def pictures(calibration: StrapdownCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first."""
     estimate = calibration.estimate

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +14,12 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.instruments.by_angle import CHANNELS
 from inercal.foundation.records.places import counted, places
-from inercal.foundation.records.record import Record
+from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
+from inercal.systems.turntable.model import FRAME
+from inercal.systems.turntable.settings import TurntableSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,3 +237,24 @@ def _averaged(
     if not np.all(np.diff(times) > 0.0):
         times, slopes = np.arange(len(groups), dtype=float), np.full(y.shape, np.nan)
     return Readings(np.array(still), channels, unit, y, samples, u_mean, times, slopes, tuple(findings))
+
+
+def basis_of(
+    record: Record,
+    settings: TurntableSettings,
+    ranges: Mapping[str, Any],
+    unit: Unit,
+    model: Formula,
+    references: tuple[str, ...],
+) -> Basis:
+    """The basis of an estimate of any test on a table; ``unit`` of the record's outputs."""
+    temperature = recorded_temperature(record)
+    conditions = conditions_of(settings, temperature, ranges, frame=FRAME, output_unit=unit.symbol)
+    return studied(
+        "calibrate turntable",
+        settings,
+        (*record.sources, *settings.chain.sources),
+        model,
+        references,
+        conditions,
+    )

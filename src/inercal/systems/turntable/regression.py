@@ -10,7 +10,7 @@ errors that stay constant over the test are unknowns with the prior variance of 
 which is the same as weighting with V + J s^2 J^T, and also says what the test tells about chi. J depends on c,
 so that the fit is repeated until c rests. Effects beside the instrument's terms (a drift, a fault that is tried) are
 more columns of A, free, or more of J, random. Where squares and products of the errors matter against u, they are in
-the readings and in V (`inercal.systems.turntable.second_order`).
+the readings and in V (`inercal.systems.turntable.weights`).
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from inercal.foundation.inference.identifiability import Identifiability, few_te
 from inercal.foundation.instruments.by_angle import ChannelModel
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel
-from inercal.systems.turntable.second_order import SecondOrder, second_order
 from inercal.systems.turntable.weights import (
     Samples,
+    SecondOrder,
     Weights,
     beside_inputs,
     least_noise,
     scatter,
+    second_order,
     weights,
     weights_of,
     whitened,

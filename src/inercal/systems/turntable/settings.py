@@ -157,7 +157,7 @@ class PositionDesign:
 
 
 DRIFT = "drift"
-"""The goal that is no coefficient."""
+"""The goal that is no coefficient: rms u of the predicted output over all directions of gravity."""
 
 SYMBOLS = {
     kind: tuple(symbol for channel in channels for symbol in channel_model(kind, channel).symbols)

@@ -17,16 +17,15 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted
-from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
+from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.budget import TypeA, TypeB, combine
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.outputs import gravity_reference
 from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.model import FRAME
-from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term
-from inercal.systems.turntable.readings import Readings, readings
+from inercal.systems.turntable.positions.outcome import unit_of_term
+from inercal.systems.turntable.readings import Readings, basis_of, readings
 from inercal.systems.turntable.regression import FLOOR
 from inercal.systems.turntable.settings import TurntableSettings
 from inercal.systems.turntable.step_response import Response, Tilted, respond, senses
@@ -235,12 +234,7 @@ def _rows(means: Readings, given: Tilted, response: Response) -> list[dict[str, 
 def _basis(record: Record, means: Readings, settings: TurntableSettings, inputs: Sequence[Tilted]) -> Basis:
     """The basis of every estimate of such a test."""
     ranges = {f"input_of_{each.channel}_m_s2": [float(each.x.min()), float(each.x.max())] for each in inputs}
-    conditions = conditions_of(
-        settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=means.unit.symbol
-    )
-    return studied(
-        COMMAND, settings, (*record.sources, *settings.chain.sources), MODEL, REFERENCES, conditions
-    )
+    return basis_of(record, settings, ranges, means.unit, MODEL, REFERENCES)
 
 
 @short_repr

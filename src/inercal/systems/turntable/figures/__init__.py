@@ -24,19 +24,14 @@ from inercal.systems.turntable.step_test import StepCalibration
 
 if TYPE_CHECKING:
     from inercal.foundation.results.result import Estimate
-    from inercal.systems.turntable.positions.calibration import PositionCalibration
     from inercal.systems.turntable.readings import Readings
+    from inercal.systems.turntable.task import PositionCalibration
 
 _SCOPES = {
     "stated": "as stated",
     "random": "all redrawn at each position",
     "constant": "all constant over the test",
 }
-
-
-def main(calibration: PositionCalibration | RateCalibration | StepCalibration) -> Picture:
-    """The picture that answers the question: the residuals, or the positions where these do not identify the terms."""
-    return pictures(calibration)[0]
 
 
 def page(calibration: PositionCalibration | RateCalibration | StepCalibration) -> str:

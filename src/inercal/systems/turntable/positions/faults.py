@@ -94,13 +94,6 @@ def _of_angle(values: Array, unit: tuple[float, str]) -> str:
     return f"{size:.2g} arcmin" if size >= 1.0 else f"{60.0 * size:.2g} arcsec"
 
 
-def _one(column: Array, channel: int, channels: int) -> Array:
-    """Columns (n, c, m) of an effect (n, m) on a single channel."""
-    made = np.zeros((len(column), channels, column.shape[-1]))
-    made[:, channel] = column
-    return made
-
-
 def reading(means: Readings, k: int) -> Fault:
     """A single reading that is wrong, in each channel: an angle that was mistyped, rows exchanged, a knock."""
     columns = np.zeros((*means.y.shape, means.y.shape[1]))
@@ -115,22 +108,22 @@ def _drifts(means: Readings, fit: Regression) -> Iterator[Fault]:
     s, fitted = fraction(means.times), fit.y - fit.residuals
     for k, name in enumerate(means.channels):
         what = f"a trend of {name} from first to last position"
-        one = _on(means, k, np.ones_like(s))[..., 0]
-        column = _on(means, k, s - 0.5)
+        one = on_channel(means, k, np.ones_like(s))[..., 0]
+        column = on_channel(means, k, s - 0.5)
         yield Fault(f"trend {name}", "trend", column, what, _of_output, "trend", within=one)
         for tau in _WARM_UP:
-            column = _on(means, k, np.exp(-s / tau))
+            column = on_channel(means, k, np.exp(-s / tau))
             what = f"a warm-up of {name}, with a time constant of {tau:g} of the test,"
             within = -column[..., 0] / tau
             yield Fault(
                 f"warm-up {tau} {name}", "warm_up", column, what, _of_output, "warm-up", within=within
             )
-        changed = _on(means, k, (s - 0.5) * fitted[:, k])
+        changed = on_channel(means, k, (s - 0.5) * fitted[:, k])
         what = f"a drift of the scale factor of {name} over the test"
         yield Fault(f"scale drift {name}", "trend", changed, what, _of_scale, "scale drift")
 
 
-def _on(means: Readings, channel: int, columns: Array) -> Array:
+def on_channel(means: Readings, channel: int, columns: Array) -> Array:
     """Columns (n, c, m) of an effect (n, m) or (n,) on a single channel."""
     made = np.zeros((*means.y.shape, 1 if columns.ndim == 1 else columns.shape[1]))
     made[:, channel] = columns.reshape(len(columns), -1)
@@ -166,13 +159,13 @@ def _heading(means: Readings, fit: Regression, k: int) -> Iterator[Fault]:
     yield Fault(
         f"heading {means.channels[k]}",
         "heading_suspect",
-        _on(means, k, felt[:, 1]),
+        on_channel(means, k, felt[:, 1]),
         f"a response of {means.channels[k]} to the east rate, as with an error of heading",
         lambda values, unit: f"{np.degrees(np.arctan2(-values[0], gain)):.2g} deg",
         "heading",
-        lambda values: _on(means, k, (gain - np.copysign(np.hypot(gain, values[0]), gain)) * felt[:, 0])[
-            ..., 0
-        ],
+        lambda values: on_channel(
+            means, k, (gain - np.copysign(np.hypot(gain, values[0]), gain)) * felt[:, 0]
+        )[..., 0],
     )
 
 
@@ -193,7 +186,7 @@ def _joints(means: Readings, fit: Regression) -> Iterator[Fault]:
         yield Fault(f"backlash {joint}", "approach_hysteresis", column, what, _of_angle, "backlash")
         for k, name in enumerate(means.channels):
             what = f"a part of {name} that goes with the sense in which {joint} was reached"
-            column = _on(means, k, sense[:, j])
+            column = on_channel(means, k, sense[:, j])
             yield Fault(
                 f"hysteresis {joint} {name}", "approach_hysteresis", column, what, _of_output, "hysteresis"
             )
@@ -220,5 +213,10 @@ def _fields(means: Readings, fit: Regression) -> Iterator[Fault]:
     for k, name in enumerate(means.channels):
         what = f"a response of {name} to a field fixed to the ground, its vertical part above all,"
         yield Fault(
-            f"field {name}", "ground_field", _on(means, k, C_nb.reshape(-1, 9)), what, _of_output, "field"
+            f"field {name}",
+            "ground_field",
+            on_channel(means, k, C_nb.reshape(-1, 9)),
+            what,
+            _of_output,
+            "field",
         )

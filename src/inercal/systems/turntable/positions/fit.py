@@ -25,7 +25,7 @@ from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.results.budget import TypeA
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, table_model
-from inercal.systems.turntable.positions.faults import fraction
+from inercal.systems.turntable.positions.faults import fraction, on_channel
 from inercal.systems.turntable.readings import Readings
 from inercal.systems.turntable.regression import (
     Effects,
@@ -177,7 +177,7 @@ def _walk(means: Readings, fit: Fit, unit: str) -> Drift:
     s = fraction(means.times)
     order = np.pi * (np.arange(min(_TERMS, n - 1)) + 0.5)
     basis = np.sqrt(2.0) * np.sin(s[:, None] * order) / order
-    walks = np.concatenate([_one(basis, k, channels) for k in range(channels)], axis=-1)
+    walks = np.concatenate([on_channel(means, k, basis) for k in range(channels)], axis=-1)
     none = np.zeros((n, channels, 0))
 
     def unlikely(log: float) -> float:
@@ -192,13 +192,6 @@ def _walk(means: Readings, fit: Fit, unit: str) -> Drift:
     many = walks.shape[-1]
     nuisance = ("bias_walk", size, size / np.sqrt(2.0 * dof), unit)
     return Drift(done, ("random walk of the biases",) * many, (dof,) * many, (nuisance,))
-
-
-def _one(columns: Array, channel: int, channels: int) -> Array:
-    """Columns (n, m) on one channel: (n, c, m)."""
-    made = np.zeros((len(columns), channels, columns.shape[1]))
-    made[:, channel] = columns
-    return made
 
 
 def _lowest(function: Callable[[float], float], grid: Array, tolerance: float) -> float:
@@ -268,6 +261,15 @@ def _with_drift(model: TableModel, means: Readings, noise: Sequence[float | None
 
     straight = to_order(False)
     return to_order(True) if second_order_matters(straight.fit) else straight
+
+
+def stated_noise(settings: TurntableSettings) -> float:
+    """Noise of a reading, which a test that is not made yet cannot tell; raises `StudyError` where none is stated."""
+    if settings.instrument.noise is None:
+        raise StudyError(
+            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
+        )
+    return settings.instrument.noise
 
 
 def choose_terms(

@@ -13,10 +13,10 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import channels_of
-from inercal.systems.turntable.positions.fit import choose_terms
+from inercal.systems.turntable.positions.fit import choose_terms, stated_noise
 from inercal.systems.turntable.positions.outcome import unit_of_term
-from inercal.systems.turntable.positions.tolerance_design import DRIFT, trial
-from inercal.systems.turntable.settings import TurntableSettings
+from inercal.systems.turntable.positions.tolerance_design import trial
+from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 
 
 def foresight(settings: TurntableSettings) -> Foresight:
@@ -25,11 +25,7 @@ def foresight(settings: TurntableSettings) -> Foresight:
 
     Raises `StudyError` for positions that do not identify the terms, without noise, and for a grid to be analysed.
     """
-    noise = settings.instrument.noise
-    if noise is None:
-        raise StudyError(
-            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
-        )
+    noise = stated_noise(settings)
     angles = _angles(settings)
     used, seen, _ = choose_terms(settings, channels_of(settings), angles)
     lost = [words for each in seen for words in each.words]

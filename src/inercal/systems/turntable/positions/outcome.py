@@ -15,15 +15,15 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_LENGTH
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.places import counted
-from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Formula, conditions_of, studied
+from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.budget import TypeA, TypeB, combine
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.rigs.chain import Scope
 from inercal.systems.turntable.judged import implausible, misordered
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.model import FRAME, orthonormal
+from inercal.systems.turntable.model import orthonormal
 from inercal.systems.turntable.positions.application import in_use
 from inercal.systems.turntable.positions.examination import examine
 from inercal.systems.turntable.positions.fit import Fitting, earth_rate_of, fewest_positions
@@ -35,11 +35,9 @@ from inercal.systems.turntable.positions.tolerance import (
     drift_shares,
     shifts,
 )
-from inercal.systems.turntable.readings import Readings
+from inercal.systems.turntable.readings import Readings, apart, basis_of
 from inercal.systems.turntable.regression import Regression, worst_rank
 from inercal.systems.turntable.settings import TurntableSettings
-
-COMMAND = "calibrate turntable"
 
 _MODELS = {
     "gyrowheel": Formula(
@@ -123,9 +121,7 @@ def sources(fit: Regression, terms: Terms, unit: str) -> list[TypeA | TypeB]:
 def assemble(record: Record, readings: Readings, fitting: Fitting, settings: TurntableSettings) -> Estimate:
     """Put the estimate together."""
     unit = readings.unit.si
-    model, conditions = _MODELS[settings.instrument.kind], _conditions(record, readings, settings)
-    sources_read = (*record.sources, *settings.chain.sources)
-    basis = studied(COMMAND, settings, sources_read, model, REFERENCES, conditions)
+    basis = _basis(record, readings, settings)
     findings = [*record.findings, *fitting.findings]
     rank, terms_asked = worst_rank(fitting.identified)
     result: dict[str, Any] = {
@@ -362,24 +358,19 @@ def _noise(readings: Readings, fit: Regression, unit: str) -> list[dict[str, Any
     ]
 
 
-def _conditions(record: Record, readings: Readings, settings: TurntableSettings) -> dict[str, Any]:
-    """Conditions and ranges over which the result is valid."""
-    ranges = {
-        f"reading_of_{name}": [low, high]
-        for name, low, high in zip(
-            readings.channels, readings.y.min(axis=0).tolist(), readings.y.max(axis=0).tolist(), strict=True
-        )
-    }
-    unit = readings.unit.symbol
-    return conditions_of(settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=unit)
+def _basis(record: Record, readings: Readings, settings: TurntableSettings) -> Basis:
+    """The basis of every estimate from positions, with the ranges over which it is valid."""
+    low, high = readings.y.min(axis=0).tolist(), readings.y.max(axis=0).tolist()
+    ends = zip(readings.channels, low, high, strict=True)
+    ranges = {f"reading_of_{name}": list(both) for name, *both in ends}
+    return basis_of(record, settings, ranges, readings.unit, _MODELS[settings.instrument.kind], REFERENCES)
 
 
 def _plan(readings: Readings, fitting: Fitting, settings: TurntableSettings) -> dict[str, Any]:
     """The positions in figures, and their name where the record holds those of the study's plan."""
     plan, name = settings.plan.angles, "of the record"
     if plan.shape == readings.angles.shape:
-        apart = np.abs(np.remainder(plan - readings.angles + np.pi, 2.0 * np.pi) - np.pi)
-        name = settings.plan.name if apart.max() < 1e-3 else name
+        name = settings.plan.name if np.abs(apart(plan, readings.angles)).max() < 1e-3 else name
     condition, efficiency = in_basis(orthonormal(fitting.model, readings.angles))
     return {
         "name": name,

@@ -31,7 +31,7 @@ from inercal.foundation.rigs.plans import Plan, named, within
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
-from inercal.systems.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms
+from inercal.systems.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms, stated_noise
 from inercal.systems.turntable.positions.outcome import unit_of_term
 from inercal.systems.turntable.positions.tolerance import drift_shares, sphere_rows
 from inercal.systems.turntable.regression import fit, full_inputs, identify_channels, worst_rank
@@ -113,10 +113,7 @@ def design(
         No noise is stated, or no choice among the candidates that the limits leave identifies the terms.
     """
     asked = settings.design
-    if settings.instrument.noise is None:
-        raise StudyError(
-            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
-        )
+    stated_noise(settings)
     model, c, findings = expected_model(settings)
     everywhere = candidates_of(model, asked.candidates.angles, c, settings, asked.table_errors)
     mask = within(asked.candidates.angles, [settings.limits.get(joint) for joint in model.chain.joints])

@@ -24,7 +24,7 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.rigs.plans import Plan, named, within
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, channels_of
-from inercal.systems.turntable.positions.fit import choose_terms
+from inercal.systems.turntable.positions.fit import choose_terms, stated_noise
 from inercal.systems.turntable.positions.planning import (
     candidates_of,
     expected_coefficients,
@@ -33,11 +33,8 @@ from inercal.systems.turntable.positions.planning import (
 )
 from inercal.systems.turntable.positions.tolerance import sphere_rows
 from inercal.systems.turntable.regression import solve
-from inercal.systems.turntable.settings import TurntableSettings
+from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 from inercal.systems.turntable.weights import Samples, averaged, beside_inputs, least_noise, weights_of
-
-DRIFT = "drift"
-"""The goal that is no coefficient: rms u of the predicted output over all directions of gravity."""
 
 REFERENCES = (
     "S. Boyd, S.-J. Kim, L. Vandenberghe, A. Hassibi, A tutorial on geometric programming, Optimization and "
@@ -165,10 +162,7 @@ def design_tolerances(
     goal, prices = settings.tolerances.goal, settings.tolerances.prices
     if not goal:
         raise StudyError("goal", 'missing, expected wanted uncertainties such as DX_F = "0.01 deg/h"')
-    if settings.instrument.noise is None:
-        raise StudyError(
-            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
-        )
+    stated_noise(settings)
     if not settings.chain.errors:
         raise StudyError(
             "rig.errors", 'found none, expected present tolerances such as default = { uniform = "2 arcmin" }'

@@ -14,8 +14,8 @@ from inercal.foundation.results.shown import aligned
 from inercal.systems.turntable.display import per_g
 from inercal.systems.turntable.positions.fit import earth_rate_of
 from inercal.systems.turntable.positions.outcome import unit_of_term
-from inercal.systems.turntable.positions.tolerance_design import DRIFT, ToleranceDesign
-from inercal.systems.turntable.settings import TurntableSettings
+from inercal.systems.turntable.positions.tolerance_design import ToleranceDesign
+from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 
 
 def result(designed: ToleranceDesign, settings: TurntableSettings) -> dict[str, Any]:

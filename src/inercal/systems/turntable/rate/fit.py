@@ -22,7 +22,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import Identifiability, identify
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.rate.linearity import Deviations, Largest, drawn_errors, largest
-from inercal.systems.turntable.rate.stays import Effect, Input
+from inercal.systems.turntable.rate.stays import Effect, Input, shifts_of
 from inercal.systems.turntable.regression import FLOOR, Solution, solve
 from inercal.systems.turntable.weights import ReadingNoise, Weights, scatter
 
@@ -305,9 +305,7 @@ def _left_over(axis: str, rate: Array, residuals: Array, remainder: Array) -> li
 
 def weights_of(effects: Sequence[Effect], scale: float, n: int) -> Weights:
     """Covariance of the readings (one channel) without noise, for a scale factor."""
-    none = [np.zeros((n, 0))]
-    redrawn = scale * np.hstack(none + [effect.shift for effect in effects if effect.redrawn])
-    common = scale * np.hstack(none + [effect.shift for effect in effects if not effect.redrawn])
+    redrawn, common = (scale * shifts for shifts in shifts_of(effects, n))
     return Weights(np.square(redrawn).sum(axis=1)[:, None, None], common[:, None, :])
 
 

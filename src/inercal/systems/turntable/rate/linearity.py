@@ -21,7 +21,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.result import COVERAGE
-from inercal.systems.turntable.rate.stays import Effect
+from inercal.systems.turntable.rate.stays import Effect, shifts_of
 
 _DRAWS = 4000
 """Draws of the errors: bounds of 95.45 % are then reached in 95.45(33) %."""
@@ -88,9 +88,7 @@ def drawn_errors(
     """
     dof = max(noise_dof, 1.0)  # as the budget counts them
     spread = np.ones(_DRAWS) if np.isinf(dof) else np.sqrt(rng.chisquare(dof, _DRAWS) / dof)
-    none = [np.zeros((n, 0))]
-    redrawn = scale * np.hstack(none + [each.shift for each in effects if each.redrawn])
-    common = scale * np.hstack(none + [each.shift for each in effects if not each.redrawn])
+    redrawn, common = (scale * shifts for shifts in shifts_of(effects, n))
     drawn = noise * rng.standard_normal((_DRAWS, n)) / spread[:, None]
     drawn += np.linalg.norm(redrawn, axis=1) * rng.standard_normal((_DRAWS, n))
     return np.asarray(drawn + rng.standard_normal((_DRAWS, common.shape[1])) @ common.T)

@@ -10,18 +10,18 @@ import numpy as np
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inference.identifiability import WORST_BY_LENGTH, Identifiability
 from inercal.foundation.records.places import counted
-from inercal.foundation.records.record import Record, recorded_temperature
-from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
+from inercal.foundation.records.record import Record
+from inercal.foundation.results.basis import Basis, Formula
 from inercal.foundation.results.budget import TypeA, TypeB, Uncertainty, combine
 from inercal.foundation.results.remarks import ruled_by_site
 from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.turntable.judged import implausible, misordered
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.model import FRAME
-from inercal.systems.turntable.positions.outcome import COMMAND, unit_of_term
+from inercal.systems.turntable.positions.outcome import unit_of_term
 from inercal.systems.turntable.rate.fit import GyroRateFit, approaches
 from inercal.systems.turntable.rate.judged import judged_rates
 from inercal.systems.turntable.rate.stays import Input, RateDwells
+from inercal.systems.turntable.readings import basis_of
 from inercal.systems.turntable.settings import TurntableSettings
 
 MODEL = Formula(
@@ -255,9 +255,4 @@ def _shares(
 def _basis(record: Record, dwells: RateDwells, settings: TurntableSettings) -> Basis:
     """The basis of every estimate of a rate test."""
     ranges = {"rate_rad_s": [float(dwells.rate.min()), float(dwells.rate.max())]}
-    conditions = conditions_of(
-        settings, recorded_temperature(record), ranges, frame=FRAME, output_unit=dwells.unit.symbol
-    )
-    return studied(
-        COMMAND, settings, (*record.sources, *settings.chain.sources), MODEL, REFERENCES, conditions
-    )
+    return basis_of(record, settings, ranges, dwells.unit, MODEL, REFERENCES)

@@ -9,7 +9,7 @@ sees the part across.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -254,6 +254,15 @@ class Effect:
     unit: str
     shift: Array
     redrawn: bool = False
+
+
+def shifts_of(effects: Sequence[Effect], n: int) -> tuple[Array, Array]:
+    """Shifts (n, q) of effects on n stays: of those that are redrawn at each stay, and of those that are not."""
+    redrawn, common = (
+        np.hstack([np.zeros((n, 0)), *(effect.shift for effect in effects if effect.redrawn is way)])
+        for way in (True, False)
+    )
+    return redrawn, common
 
 
 @dataclass(frozen=True, eq=False)
