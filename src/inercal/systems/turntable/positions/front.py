@@ -24,8 +24,8 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.rigs.plans import Plan, within
 from inercal.systems.turntable.model import TableModel
 from inercal.systems.turntable.positions.planning import candidates_of, expected_model, largest_index
-from inercal.systems.turntable.positions.tolerance_design import DRIFT, searched, trial
-from inercal.systems.turntable.settings import TurntableSettings
+from inercal.systems.turntable.positions.tolerance_design import searched, trial
+from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 
 _NUMBERS = (0.5, 0.75, 1.0, 1.5, 2.0)
 """Numbers of positions, over that of the study."""
