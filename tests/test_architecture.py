@@ -299,7 +299,7 @@ CEILINGS = {
     "names used across folders": 1506,
     "class names shared": 5,
     "constants outside Limits": 448,
-    "modules": 661,
+    "modules": 662,
 }
 
 
