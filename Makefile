@@ -46,12 +46,14 @@ test: .venv/dev/installed
 	    $(DEV)/python -m pytest -n 3 --dist worksteal -m "not campaign" --slow-rule list; \
 	    tests=$$?; wait $$types && exit $$tests
 
-# The full numbers of runs, of which `make test` has short versions; and tests of kernels as numba compiles them.
+# The full numbers of runs, of which `make test` has short versions; and tests of kernels, which there run compiled, as
+# numba compiles them and as plain Python.
 campaign: .venv/dev/installed
 	$(DEV)/python kernels/build.py --in-place
 	$(DEV)/python -m pytest -n 2 --dist worksteal -m campaign
 	$(DEV)/python -m pytest -n 2 --dist worksteal -m "hypothesis and not campaign" --hypothesis-profile thorough
 	INERCAL_KERNELS=numba $(DEV)/python -m pytest -n 2 --dist worksteal -m kernels
+	INERCAL_KERNELS=python $(DEV)/python -m pytest -n 2 --dist worksteal -m kernels
 
 # Compiled lines cannot be counted: short tests of kernels run once more with kernels as plain Python.
 coverage: .venv/dev/installed

@@ -33,6 +33,8 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 PACKAGE = SOURCE / "inercal"
 TABLE = HERE / "signatures.json"
+FILES = ["build.py", "caller.c", "compile.py", "entries.py", "runtime.c", TABLE.name]
+"""What makes machine code of sources: in a checkout it must still be the same for that to be used."""
 
 #: processors that the code runs on -> LLVM's name: the oldest of each kind, since a wheel is for all
 PROCESSORS = {"x86_64": "x86-64", "amd64": "x86-64", "arm64": "generic", "aarch64": "generic"}
@@ -68,7 +70,7 @@ def built() -> Path:
     parts = _once(
         _key(of_sources, compiler, TABLE, HERE / "compile.py"), lambda folder: _compile(folder, len(table))
     )
-    whole = _key(parts.name, *sorted(HERE.glob("*.[ch]")), HERE / "build.py")
+    whole = _key(parts.name, digest(HERE, FILES))
     (module,) = _once(whole, lambda folder: _link(folder, parts, files, of_sources)).iterdir()
     return module
 
@@ -108,21 +110,27 @@ def _compile(folder: Path, count: int) -> None:
     """Objects in ``folder``, by two processes, and what is in them."""
     _say(f"compiling {count} kernels, once: about a minute on two processors")
     began = time.perf_counter()
-    environment = os.environ | {
-        "INERCAL_KERNELS": "numba",
-        "NUMBA_CPU_NAME": _processor(),
-        "NUMBA_CPU_FEATURES": "",
-        "PYTHONPATH": os.pathsep.join([str(SOURCE), str(HERE)]),
-        "PYTHONHASHSEED": "0",  # the same code from the same sources
-    }
     parts = [
-        subprocess.Popen([sys.executable, str(HERE / "compile.py"), part, str(folder)], env=environment)
+        subprocess.Popen([sys.executable, str(HERE / "compile.py"), part, str(folder)], env=environment())
         for part in ("0", "1")
     ]
     codes = [part.wait() for part in parts]
     if any(codes):
         raise SystemExit("the kernels were not compiled")
     _say(f"compiled in {time.perf_counter() - began:.0f} s")
+
+
+def environment() -> dict[str, str]:
+    """Of the processes that compile."""
+    # pip lets its isolated build find numba by a path of its own
+    paths = [str(SOURCE), str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {
+        "INERCAL_KERNELS": "numba",
+        "NUMBA_CPU_NAME": _processor(),
+        "NUMBA_CPU_FEATURES": "",
+        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONHASHSEED": "0",  # the same code from the same sources
+    }
 
 
 def _link(folder: Path, parts: Path, files: list[str], of_sources: str) -> None:
@@ -146,6 +154,8 @@ def _link(folder: Path, parts: Path, files: list[str], of_sources: str) -> None:
         "static const char FILES[] =",
         *[f'  "{file}\\n"' for file in files],
         ";",
+        f'static const char BUILD[] = "{digest(HERE, FILES)}";',
+        f'static const char BUILD_FILES[] = "{" ".join(FILES)}";',
     ]
     work = folder.parent
     (work / "entries.inc").write_text("\n".join(lines) + "\n")

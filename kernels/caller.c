@@ -2,7 +2,7 @@
    was compiled for and flattened as numba flattens them; the kernel runs without the GIL.
 
    The module has ALL (a dict from the full name of a kernel to its function), Unfit (raised where no signature fits),
-   and SOURCES and FILES, by which `inercal.foundation._jit` knows whether it is stale. */
+   and SOURCES and FILES, BUILD and BUILD_FILES, by which `inercal.foundation._jit` knows whether it is stale. */
 #define PY_SSIZE_T_CLEAN
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
@@ -164,7 +164,9 @@ PyMODINIT_FUNC PyInit__kernels(void) {
     }
     if (PyModule_AddObjectRef(module, "ALL", all) != 0 || PyModule_AddObjectRef(module, "Unfit", unfit) != 0 ||
         PyModule_AddStringConstant(module, "SOURCES", SOURCES) != 0 ||
-        PyModule_AddStringConstant(module, "FILES", FILES) != 0)
+        PyModule_AddStringConstant(module, "FILES", FILES) != 0 ||
+        PyModule_AddStringConstant(module, "BUILD", BUILD) != 0 ||
+        PyModule_AddStringConstant(module, "BUILD_FILES", BUILD_FILES) != 0)
         return NULL;
     Py_DECREF(all);
     return module;

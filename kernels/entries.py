@@ -37,11 +37,12 @@ class Sources:
         self.entries = sorted({name for module in self.trees for name in self._asked(module)})
 
     def rests_on(self) -> list[str]:
-        """Paths in the package of the files that hold what entries reach by name: kernels, types, constants."""
-        begin = [
+        """Paths in the package of the files that hold what entries reach by name: kernels, types, constants; and of the
+        door."""
+        queue = [
             (module, node) for (module, name), node in self.kernels.items() if (module, name) in self.entries
         ]
-        found, queue = {module for module, _ in begin}, begin
+        found = {DOOR, *(module for module, _ in queue)}  # the door says with which options
         seen: set[Name] = set(self.entries)
         while queue:
             module, node = queue.pop()
@@ -94,11 +95,11 @@ class Sources:
             queue += ast.iter_child_nodes(node)
 
 
-def digest(package: Path, files: list[str]) -> str:
-    """SHA-256 of files of a package, as `inercal.foundation._jit` takes it when kernels are first asked for."""
+def digest(folder: Path, files: list[str]) -> str:
+    """SHA-256 over files of a folder, as `inercal.foundation._jit` takes it when kernels are first asked for."""
     found = hashlib.sha256()
     for file in files:
-        found.update((package / file).read_bytes() + b"\0")
+        found.update((folder / file).read_bytes() + b"\0")
     return found.hexdigest()
 
 

@@ -10,9 +10,9 @@ from new_studies import FILL
 from inercal.cli import run
 
 HEAVY = {
-    "cyclopts", "h5py", "jinja2", "matplotlib", "numba", "pandas", "pint", "pyarrow", "pydantic", "rich",
-    "scipy.interpolate", "scipy.io", "scipy.ndimage", "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats",
-    "xarray",
+    "cyclopts", "h5py", "jinja2", "matplotlib", "numba", "numpy.ctypeslib", "numpy.f2py", "numpy.testing",
+    "pandas", "pint", "pyarrow", "pydantic", "rich", "scipy.interpolate", "scipy.io", "scipy.ndimage", "scipy.optimize",
+    "scipy.signal", "scipy.special", "scipy.stats", "xarray",
 }  # fmt: skip
 """What takes a fiftieth of a second or more to load."""
 
@@ -31,9 +31,9 @@ STARTS = {
 }
 ASKED = f"""
 import sys
-from inercal.cli import run
+from inercal.cli import main
 try:
-    code = run(sys.argv[1:])
+    main(sys.argv[1:])
 except SystemExit as ended:
     code = ended.code or 0
 assert code in (0, 1), code

@@ -13,6 +13,7 @@ import typing
 import numpy as np
 import pytest
 
+import build
 import entries
 from inercal.examples import FOLDER
 from inercal.foundation import _jit
@@ -63,7 +64,8 @@ def test_machine_code_rests_on_constants_of_other_modules_too(sources):
     files = set(sources.rests_on())
     kernels = {sources.paths[module] for module, _ in sources.entries}
     assert {path.relative_to(entries.SOURCE / "inercal").as_posix() for path in kernels} <= files
-    assert {"systems/selfcal/limits.py", "systems/selfcal/platform/layout.py"} <= files
+    options = "foundation/_jit.py"
+    assert {options, "systems/selfcal/limits.py", "systems/selfcal/platform/layout.py"} <= files
     assert len(files) < 80
 
 
@@ -97,12 +99,14 @@ def twice(x):
     if not isinstance(x, float): raise Unfit
     return "compiled"
 ALL, FILES, SOURCES = {"inercal.room.twice": twice}, "room.py\\n", "@"
+BUILD_FILES, BUILD = "signatures.json", hashlib.sha256(b"[]\\0").hexdigest()
 """
 
 
 @pytest.fixture
 def tiny(tmp_path):
-    """A package with a kernel, and a module that stands for its machine code."""
+    """A checkout of a package with a kernel, and a module that stands for its machine code."""
+    tmp_path = tmp_path / "src"
     (tmp_path / "inercal" / "foundation").mkdir(parents=True)
     for folder in ("", "foundation"):
         (tmp_path / "inercal" / folder / "__init__.py").touch()
@@ -110,6 +114,8 @@ def tiny(tmp_path):
     (tmp_path / "inercal" / "room.py").write_text(KERNEL)
     digest = entries.digest(tmp_path / "inercal", ["room.py"])
     (tmp_path / "inercal" / "_kernels.py").write_text(CODE.replace("@", digest))
+    (tmp_path.parent / "kernels").mkdir()
+    (tmp_path.parent / "kernels" / "signatures.json").write_text("[]")
     return tmp_path
 
 
@@ -126,6 +132,23 @@ def test_stale_machine_code_is_never_used_and_said_once(tiny):
     assert found == "15.0 20.0"
     assert said.count("kernels have changed since they were compiled") == 1
     assert "make kernels" in said
+
+
+def test_machine_code_of_another_table_of_what_python_calls_is_stale_too(tiny):
+    """The sources of kernels may be the same where Python begins to call one more: it would run as plain Python."""
+    table = tiny.parent / "kernels" / "signatures.json"
+    table.write_text('[""]')
+    assert "kernels have changed since" in python("from inercal.room import twice", tiny)[1]
+    table.unlink()  # a wheel has none
+    assert python(PRINT.format("4.0"), tiny) == ("compiled compiled", "")
+
+
+def test_the_processes_that_compile_find_what_an_isolated_build_installed(tmp_path, monkeypatch):
+    (tmp_path / "of_pip.py").touch()
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    command = [sys.executable, "-c", "import of_pip, entries, inercal; print(inercal.__file__)"]
+    done = subprocess.run(command, env=build.environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(str(entries.SOURCE))
 
 
 def test_arguments_of_other_types_are_computed_all_the_same_with_a_warning_or_refused(tiny):

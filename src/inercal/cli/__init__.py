@@ -12,6 +12,7 @@ import warnings
 from types import FrameType
 
 from inercal import __version__
+from inercal.cli.lean import lean_scipy
 from inercal.foundation.addresses import shown_address, without_secrets
 from inercal.foundation.errors import InercalError
 
@@ -49,6 +50,7 @@ def process_age() -> float:
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit: 0 sound, 1 a bad verdict, 2 bad input or usage, 130 asked to end."""
     gc.set_threshold(50_000, 20, 20)  # loading and drawing make many objects that stay: a tenth of the time
+    lean_scipy()
     # a pool begins each Python in the working folder, where modules among foreign files would be imported
     os.environ.setdefault("PYTHONSAFEPATH", "1")
     for signum in asking_to_end():

@@ -2,8 +2,9 @@
 
 A kernel is plain Python. Those that Python calls are compiled when the wheel is built, or by `make kernels`, into
 ``_kernels``, a module of machine code that needs no compiler: `kernel` and its siblings put its functions in the
-place of theirs, where the sources are still those that it was made from. Where it is absent, numba compiles kernels as
-they are called (the extra `jit`), or they run as plain Python, which is slow.
+place of theirs, where all that it was made from is the same: the kernels, this file and, in a checkout, the build.
+Where it is absent, numba compiles kernels as they are called (the extra `jit`), or they run as plain Python, which is
+slow.
 
 INERCAL_KERNELS chooses by hand: `compiled` takes nothing else, and refuses arguments of types that no machine code is
 there for; `numba`; `python`.
@@ -79,6 +80,14 @@ def _refuse(text: str) -> NoReturn:
     raise InputError(CHOICE, text)
 
 
+def digest(folder: Path, files: str) -> str:
+    """SHA-256 over the contents of ``files``, paths in a ``folder`` with a space or line feed between."""
+    found = hashlib.sha256()
+    for file in files.split():
+        found.update((folder / file).read_bytes() + b"\0")
+    return found.hexdigest()
+
+
 def _machine_code() -> tuple[Any, str]:
     """``_kernels``; or None, and why. It tells once that it is not used where the sources have changed."""
     try:
@@ -86,11 +95,12 @@ def _machine_code() -> tuple[Any, str]:
     except ImportError:
         return None, "kernels are not compiled"
     module: Any = _kernels
-    digest = hashlib.sha256()
+    build = PACKAGE.parents[1] / "kernels"  # of a checkout: its table says what Python calls
     with suppress(OSError):
-        for file in module.FILES.split():
-            digest.update((PACKAGE / file).read_bytes() + b"\0")
-        if digest.hexdigest() == module.SOURCES:
+        same = digest(PACKAGE, module.FILES) == module.SOURCES
+        if same and (
+            not (build / "signatures.json").exists() or digest(build, module.BUILD_FILES) == module.BUILD
+        ):
             return module, ""
     why = "kernels have changed since they were compiled"
     if not os.environ.get(CHOICE):
