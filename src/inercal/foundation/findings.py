@@ -61,6 +61,7 @@ CODES: dict[str, Code] = {
     "outlier": Code("single samples far from their neighbours", _BY_SIZE, rank=16),
     "contradiction": Code("sensors contradict each other", _BY_SIZE, rank=14),
     "axis_missing": Code("a channel of a triad is not there", _NEVER),
+    "mounting_found": Code("the instrument sits on its reference as its outputs show, not as stated", _NEVER),
     "gyro_missing": Code("there are no gyro channels, or they cannot be calibrated", _NEVER),
     "gyro_restless": Code("the gyro is too restless in the holds to help in finding them", _NEVER),
     "g_sensitivity": Code("the gyro output changes with the pose", _BY_SIZE),

@@ -39,6 +39,7 @@ from inercal.systems.imu.settings import (
     SectionsSettings,
     Simulation,
     mounting_of,
+    of_attitude,
 )
 
 
@@ -47,8 +48,12 @@ def aided_settings(table: AidedRig, where: object) -> AidedSettings:
 
     Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
     """
+    mounting = mounting_of(table.mounting)
+    if table.reference is not None:
+        assert mounting is not None
+        return AidedSettings(of_attitude(table.reference, mounting), None, table.reference)
     azimuth = table.rig.base.azimuth
-    chain = chain_of(table.rig, where, mounting_of(table.mounting), "imu.aided.rig")
+    chain = chain_of(table.rig, where, mounting, "imu.aided.rig")
     return AidedSettings(chain, None if azimuth is None else azimuth.u)
 
 

@@ -144,8 +144,15 @@ first_dwell = "60 s"
 
 def imu_study(channels: Collection[str]) -> dict[str, Any]:
     """Keys of a new study of an IMU, whose method follows from the channels of the recording."""
-    method = "aided" if "phi1" in channels else "ferraris" if "label" in channels else "multiposition"
-    return _keys(f'{_COMMON}[imu]\nmethod = "{method}"\n')
+    attitude = "q_ref_0" in channels
+    aided = attitude or "phi1" in channels
+    method = "aided" if aided else "ferraris" if "label" in channels else "multiposition"
+    keys = _keys(f'{_COMMON}[imu]\nmethod = "{method}"\n')
+    if attitude:
+        keys["imu"]["aided"] = {"reference": {"up": "+z"}}
+    elif aided and "phi2" not in channels:
+        keys["imu"]["aided"] = {"rig": {"kind": "chain", "chain": [{"joint": "phi1", "axis": "z"}]}}
+    return keys
 
 
 def strapdown_study() -> dict[str, Any]:

@@ -300,6 +300,21 @@ class Limits:
     judged_rows: int = 1000
     """Rows of each sensor that are judged at most: those of longer records are summed."""
 
+    quaternion_norm: float = 0.01
+    """Largest departure from 1 of the norm of a quaternion."""
+
+    noise_of_rest: float = 6.0
+    """Turn between two recorded attitudes, over the standard deviation of their noise, that is none."""
+
+    noise_of_reference: float = 2.0
+    """Noise of a recorded attitude, over that of the gyro, beyond which residuals tell nothing of the gyro."""
+
+    block_of_attitudes: float = 1.0
+    """Shortest block [s] of the gyro beside a recorded attitude."""
+
+    reference_window: float = 0.1
+    """Time [s] over which a recorded attitude is smoothed by cubics."""
+
     left_at_prior: float = 0.5
     """u of a value over that of its prior below which the turns about one axis tell it; of a bias the largest share of
     its variance by priors of gains."""

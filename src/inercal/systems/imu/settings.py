@@ -15,7 +15,8 @@ from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, table, within
-from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.rigs.chain import Chain, Error, Fixed, Scope
+from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.stated import StatedRig
 from inercal.foundation.units import Quantity
 
@@ -71,6 +72,26 @@ SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
 @dataclass(frozen=True)
+class AidedReference:
+    """A reference attitude of another instrument, such as a robot or motion capture, in the place of a table."""
+
+    up: SignedAxis = option("axis of the reference that points up", "+z", example="+z")
+    level: float = quantity(
+        "standard uncertainty with which it is vertical", "angle", "2 deg", example="0.1 deg", bounds=TILT,
+    )  # fmt: skip
+    scalar: Literal["first", "last"] = option(
+        "place of the scalar in q_ref_0 to q_ref_3", "first", example="first"
+    )
+    sense: Literal["body to reference", "reference to body"] = option(
+        "what the attitude takes to what", "body to reference", example="body to reference"
+    )
+    angles: Literal["zyx", "zxy", "yxz", "yzx", "xyz", "xzy", "zyz", "zxz"] = option(
+        "axes about which phi1, phi2 and phi3 turn, each one of the frame reached so far, where there is no quaternion",
+        "zyx", example="zyx",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class AidedRig:
     """Reference-aided calibration: the table, and the instrument on it."""
 
@@ -82,6 +103,10 @@ class AidedRig:
         "axes of the table, at zero angles, along which the instrument's x, y and z point", ("+x", "+y", "+z"),
         example=["+x", "+y", "+z"],
     )  # fmt: skip
+    reference: AidedReference | None = table(
+        "a reference attitude that is recorded, in the place of a table: q_ref_0 to q_ref_3, or phi1, phi2, phi3",
+        None,
+    )
 
     def __post_init__(self) -> None:
         """Refuse axes that make no frame, and ranges, which would change nothing."""
@@ -90,6 +115,8 @@ class AidedRig:
             raise InputError(
                 "", f"found the mounting {axes}, expected three axes that make a right-handed frame"
             )
+        if self.reference is not None and self.stated_rig is not None:
+            raise InputError("", "found rig beside reference, expected one of the two")
         if self.rig.limits.stated:
             raise InputError("", "found rig.limits, expected none: the angles are those of the record")
 
@@ -110,10 +137,13 @@ class AidedSettings:
         columns of the record. Errors of scope ``sample`` are left to the scatter of the data.
     azimuth_u : float or None
         Standard uncertainty [rad] of the azimuth in the chain's base; None: the azimuth is not known.
+    reference : AidedReference or None
+        A recorded attitude in the place of joints; the chain is then the errors of its level, and the mounting.
     """
 
     chain: Chain = field()
     azimuth_u: float | None = None
+    reference: AidedReference | None = None
 
 
 @dataclass(frozen=True)
@@ -346,9 +376,20 @@ def mounting_of(axes: tuple[str, str, str]) -> Array | None:
     -------
     (3, 3), or None where the three make no right-handed frame
     """
-    columns = [float(f"{axis[0]}1") * np.eye(3)["xyz".index(axis[1])] for axis in axes]
-    rotation = np.stack(columns, axis=1)
+    rotation = np.stack([axis_of(axis) for axis in axes], axis=1)
     return rotation if np.linalg.det(rotation) > 0.5 else None
+
+
+def of_attitude(reference: AidedReference, mounting: Array) -> Chain:
+    """The chain of a reference attitude: how level it is, and the ``mounting`` (3, 3) of the instrument on its body."""
+    tilt, what = normal(max(reference.level, 1e-9)), "tilt of the reference"
+    x, y = Error("dlevel_x", "x", tilt, Scope.RIG, what), Error("dlevel_y", "y", tilt, Scope.RIG, what)
+    return Chain((x, y, Fixed(mounting)))
+
+
+def axis_of(name: str) -> Array:
+    """The unit vector (3,) of ``+x``, ``-x``, .."""
+    return np.asarray(float(f"{name[0]}1") * np.eye(3)["xyz".index(name[1])])
 
 
 def mountings() -> dict[tuple[str, ...], Array]:

@@ -87,8 +87,9 @@ def triad_of(record: Record, sensor: str) -> Triad | None:
     return replace(triad, t=triad.t - half) if half else triad
 
 
-def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
-    """Cut a triad into blocks of equally many samples, without those that lack samples or saturate.
+def cut(triad: Triad, motion: TableMotion, rests: Array, least: float = LIMITS.block) -> Blocks:
+    """Cut a triad into blocks of equally many samples, ``least`` [s] at least, without those that lack samples or
+    saturate.
 
     Raises
     ------
@@ -101,7 +102,7 @@ def cut(triad: Triad, motion: TableMotion, rests: Array) -> Blocks:
     if not np.isfinite(interval):
         raise RecordError(triad.source.path, f"{triad.sensor} has no increasing time stamps")
     t = triad.t
-    length = max(LIMITS.block, (t[-1] - t[0]) / LIMITS.most_blocks, 2.0 * motion.step)
+    length = max(least, (t[-1] - t[0]) / LIMITS.most_blocks, 2.0 * motion.step)
     s = max(1, round(length / interval))
     n = len(t) // s
     steps = np.clip(np.diff(t), 0.0, 1.5 * interval)

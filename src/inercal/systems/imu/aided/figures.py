@@ -39,12 +39,13 @@ def _test(calibration: AidedCalibration) -> Picture:
     """Angles of the table over time."""
     motion, rests = calibration.motion, calibration.rests
     marks: list[Mark] = [Strips(rests, COLOURS[2], 0.2)]
-    for k, (name, angle) in enumerate(zip(motion.chain.joints, motion.angles.T, strict=True)):
-        marks.append(Line(*envelope(motion.t, np.degrees(angle)), name, COLOURS[k]))
+    names, curves, across = motion.curves
+    for k, (name, curve) in enumerate(zip(names, curves.T, strict=True)):
+        marks.append(Line(*envelope(motion.t, curve), name, COLOURS[k]))
     return draw(
-        "The table",
-        f"Angles of the table over the test, whole turns counted. Shaded: the {len(rests)} rests.",
-        [[Panel(marks, Axis("time [s]", margin=0.005), Axis("angle [deg]"))]],
+        "The reference",
+        f"Angles of the table, or attitude of the reference, over the test. Shaded: the {len(rests)} rests.",
+        [[Panel(marks, Axis("time [s]", margin=0.005), Axis(across))]],
         2.0,
     )
 

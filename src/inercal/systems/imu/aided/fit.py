@@ -244,7 +244,7 @@ def fit(
     """
     x = layout.mean.copy()
     late = {side.sensor: layout.places[f"time shift of {side.sensor}"][0] for side in sides}
-    references = {side.sensor: reference(side.blocks, motion, 0.0) for side in sides}
+    references = {side.sensor: reference(side.blocks, motion.seen_by(side.sensor), 0.0) for side in sides}
     converged = False
     for rough in (True, False):
         noise: list[Levels] = []
@@ -276,7 +276,7 @@ def fit(
             for side in sides:
                 shift = float(x[late[side.sensor]])
                 if abs(shift - references[side.sensor].shift) > SAME:
-                    references[side.sensor] = reference(side.blocks, motion, shift)
+                    references[side.sensor] = reference(side.blocks, motion.seen_by(side.sensor), shift)
     root = layout.sd[:, None] * inverse
     identified = {side.sensor: _identified(sensors, layout, side.sensor, names) for side in sides}
     return AidedFit(layout, x, root @ root.T, sensors, references, identified, converged)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from inercal.foundation.rigs.chain import Chain, Error, Scope
 from inercal.foundation.rigs.patterns import Numbers
 from inercal.systems.imu.limits import LIMITS
 
+_FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
+
 
 @dataclass(frozen=True, eq=False)
 class TableMotion:
@@ -26,6 +30,8 @@ class TableMotion:
 
     ``findings`` say which readings were left out.
     """
+
+    words: ClassVar[str] = "the table's angles"
 
     chain: Chain
     t: Array
@@ -58,6 +64,55 @@ class TableMotion:
         """The table without its errors."""
         return Chain(tuple(each for each in self.chain.elements if not isinstance(each, Error)))
 
+    def positions(self, t: Array) -> Array:
+        """Angles (n, joints) [rad] of the chain at times ``t`` (n,)."""
+        return self.at(t)
+
+    def turned(self, by: float) -> Array:
+        """Sizes (m, joints) [rad] of the turns from half of ``by`` [s] before each of the times to half of it after."""
+        return np.asarray(np.abs(self.at(self.t + 0.5 * by) - self.at(self.t - 0.5 * by)))
+
+    @property
+    def travel(self) -> float:
+        """Largest angle [rad] between two attitudes about one axis."""
+        return float(np.max(np.ptp(self.angles, axis=0)))
+
+    def turns_by_errors(self, t: Array) -> Array:
+        """Turns (n, k, 3) [rad/rad] of the instrument, in its own axes, by each error of the chain."""
+        turned = np.einsum("nji,nkjl->nkil", self.attitude(t), self.chain.slopes(self.at(t)))
+        return np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
+
+    def place(self, t: float) -> dict[str, list[float]]:
+        """The angles at a time, for a table."""
+        return {"angles_rad": self.at(np.array(t)).tolist()}
+
+    @property
+    def curves(self) -> tuple[Sequence[str], Array, str]:
+        """Names, values (m, k) and axis of what a picture shows of it."""
+        return self.chain.joints, np.degrees(self.angles), "angle [deg]"
+
+    def seen_by(self, sensor: str) -> TableMotion:
+        """The motion that the outputs of a sensor are compared with."""
+        return self
+
+    def readings(self) -> Iterator[tuple[str, TableMotion]]:
+        """Other readings of the angles, in words, and what they say."""
+        joints = self.chain.joints
+        for factor, size in _FACTORS:
+            for order in itertools.permutations(range(len(joints))):
+                for signs in itertools.product((1.0, -1.0), repeat=len(joints)):
+                    texts = []
+                    if size:
+                        texts.append(f"the angles are {size} (check whether they are in deg or rad)")
+                    if order != tuple(range(len(joints))):
+                        texts.append(f"the columns {', '.join(joints)} are exchanged")
+                    wrong = [name for name, sign in zip(joints, signs, strict=True) if sign < 0.0]
+                    if wrong:
+                        texts.append(f"the sign of {' and '.join(wrong)} is reversed")
+                    if texts and len(texts) < 3:
+                        angles = factor * self.angles[:, order] * np.array(signs)
+                        yield " and ".join(texts), replace(self, angles=angles)
+
     @property
     def step(self) -> float:
         """Median interval of the angles [s]."""
@@ -65,9 +120,7 @@ class TableMotion:
 
     def rests(self) -> Array:
         """Begin and end (k, 2) [s] of the rests."""
-        half = 0.5 * LIMITS.speed_window
-        moved = self.at(self.t + half) - self.at(self.t - half)
-        still = np.all(np.abs(moved) < LIMITS.rest_speed * LIMITS.speed_window, axis=1)
+        still = np.all(self.turned(LIMITS.speed_window) < LIMITS.rest_speed * LIMITS.speed_window, axis=1)
         edges = np.diff(still.astype(np.int8), prepend=0, append=0)
         starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
         spans = np.column_stack([self.t[starts], self.t[stops]])
@@ -88,7 +141,8 @@ def motion_of(record: Record, chain: Chain) -> TableMotion:
         raise RecordError(
             path,
             f"found no column {' and no column '.join(missing)}, expected the table's angles "
-            f'{", ".join(chain.joints)} (a calibration without a table has imu.method = "multiposition")',
+            f'{", ".join(chain.joints)} (a table of one axis has imu.aided.rig.kind = "chain" and chain = [{{ joint = '
+            '"phi1", axis = "z" }]; without a table there is imu.method = "sections")',
         )
     columns = [record[name] for name in chain.joints]
     t = columns[0].t
@@ -192,10 +246,7 @@ def error_nodes(motion: TableMotion, t: Array, rests: Array) -> Iterator[ErrorNo
     chain = motion.chain
     if not chain.errors:
         return
-    angles = motion.at(t)
-    C_nb, numbers = motion.attitude(t), values_of(motion, rests)
-    turned = np.einsum("nji,nkjl->nkil", C_nb, chain.slopes(angles))
-    vectors = np.stack([turned[..., 2, 1], turned[..., 0, 2], turned[..., 1, 0]], axis=-1)
+    vectors, numbers = motion.turns_by_errors(t), values_of(motion, rests)
     each_rest = np.stack(
         [np.interp(t, rests.ravel(), np.repeat(row, 2)) for row in np.eye(len(rests))], axis=-1
     ) if len(rests) else np.ones((len(t), 1))  # fmt: skip
@@ -215,8 +266,7 @@ def values_of(motion: TableMotion, rests: Array) -> Mapping[str, Numbers]:
 
     Offsets turn nothing and are left out, as is what is left to the scatter: errors of scope ``sample``.
     """
-    angles = motion.at(rests.mean(axis=1)) if len(rests) else motion.angles[:1]
-    groups = motion.chain.groups(angles)
+    groups = motion.chain.groups(motion.positions(rests.mean(axis=1) if len(rests) else motion.t[:1]))
     return {
         error.name: numbers
         for error, numbers in zip(motion.chain.errors, groups, strict=True)

@@ -4,54 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.systems.imu.aided.blocks import Blocks, small_turn
+from inercal.systems.imu.aided.agreement import agreement, expected, match
+from inercal.systems.imu.aided.attitudes import AttitudeMotion, mounted
+from inercal.systems.imu.aided.blocks import Blocks
 from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
 from inercal.systems.imu.settings import mountings
-
-_FACTORS = ((1.0, ""), (180.0 / np.pi, "57.3 times as large"), (np.pi / 180.0, "57.3 times as small"))
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Agreement of an output with the table: ``scale`` [output per SI unit], and ``miss``, the rms it leaves over
-    the rms of the output's variation."""
-
-    scale: float
-    miss: float
-
-
-def agreement(y: Array, x: Array) -> Agreement:
-    """Fit ``y = scale x + bias``, one scale for the three axes of (n, 3)."""
-    dy, dx = y - y.mean(axis=0), x - x.mean(axis=0)
-    scale = float(np.sum(dx * dy) / max(float(np.sum(dx * dx)), 1e-300))
-    size = float(np.sum(dy * dy))
-    if scale <= 0.0 or size == 0.0:
-        return Agreement(scale, 1.0)
-    return Agreement(scale, float(np.sqrt(np.sum((dy - scale * dx) ** 2) / size)))
-
-
-def match(blocks: Blocks, x: Array) -> Agreement:
-    """The agreement of the channels that are there with what the table says, (n, 3)."""
-    return agreement(blocks.y[:, blocks.axes], x[:, blocks.axes])
-
-
-def expected(blocks: Blocks, motion: TableMotion) -> Array:
-    """Specific force in units of gravity, or rate [rad/s], (n, 3) on the instrument's axes, roughly."""
-    if blocks.triad.sensor == "acc":
-        return motion.attitude(blocks.middle)[:, 2, :]
-    first, last = motion.attitude(blocks.nodes[:, 0]), motion.attitude(blocks.nodes[:, -1])
-    return np.asarray(small_turn(np.swapaxes(first, 1, 2) @ last) / blocks.length[:, None])
-
-
-def travel(motion: TableMotion) -> float:
-    """Largest angle [rad] between two attitudes about one axis of the table."""
-    return float(np.max(np.ptp(motion.angles, axis=0)))
 
 
 def tells(sensor: str, x: Array) -> bool:
@@ -80,7 +42,8 @@ def lag(blocks: Blocks, motion: TableMotion) -> float:
 def cures(sides: list[Blocks], motion: TableMotion) -> Iterator[str]:
     """Sentences that would make sense of outputs that do not follow the table."""
     ranked = []
-    for words, other in _angles(motion):
+    for words, reading in motion.readings():
+        other = mounted(reading, sides)[0] if isinstance(reading, AttitudeMotion) else reading
         misses = [match(each, expected(each, other)).miss for each in sides]
         if max(misses) < LIMITS.agreement_miss:
             ranked.append((sum(misses), words))
@@ -95,25 +58,6 @@ def cures(sides: list[Blocks], motion: TableMotion) -> Iterator[str]:
         return
     for each, x in zip(sides, inputs, strict=True):
         yield from _channels(each, x)
-
-
-def _angles(motion: TableMotion) -> Iterator[tuple[str, TableMotion]]:
-    """Other readings of the angles, and what they say."""
-    joints = motion.chain.joints
-    for factor, size in _FACTORS:
-        for order in itertools.permutations(range(len(joints))):
-            for signs in itertools.product((1.0, -1.0), repeat=len(joints)):
-                texts = []
-                if size:
-                    texts.append(f"the angles are {size} (check whether they are in deg or rad)")
-                if order != tuple(range(len(joints))):
-                    texts.append(f"the columns {', '.join(joints)} are exchanged")
-                wrong = [name for name, sign in zip(joints, signs, strict=True) if sign < 0.0]
-                if wrong:
-                    texts.append(f"the sign of {' and '.join(wrong)} is reversed")
-                if texts and len(texts) < 3:
-                    angles = factor * motion.angles[:, order] * np.array(signs)
-                    yield " and ".join(texts), replace(motion, angles=angles)
 
 
 def _mounted(motion: TableMotion, turn: Array) -> str:

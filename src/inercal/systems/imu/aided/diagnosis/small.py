@@ -17,8 +17,8 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import Axis, elementary
 from inercal.foundation.inference.hypotheses import Fitted, Hypothesis
 from inercal.foundation.rigs.chain import Chain, Fixed, Joint
+from inercal.systems.imu.aided.agreement import expected
 from inercal.systems.imu.aided.diagnosis.fit_quality import Whitening, without_patterns
-from inercal.systems.imu.aided.diagnosis.gross import expected
 from inercal.systems.imu.aided.fit import AidedFit
 from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
