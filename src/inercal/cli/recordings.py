@@ -29,6 +29,7 @@ def inspect(
         summary,
     )
     from inercal.foundation._files import write_text
+    from inercal.foundation.records.checks.clocks import clock_rates, turns_seen
     from inercal.foundation.records.places import counted
     from inercal.foundation.results.files import save
     from inercal.foundation.results.result import without_coefficients
@@ -39,11 +40,16 @@ def inspect(
         from inercal.systems.selfcal.reading import worth_saying
 
         record = replace(record, findings=tuple(worth_saying(record, record.columns.values())))
+    rates, seen = clock_rates(record), turns_seen(record)
+    if seen is not None:
+        record = replace(record, findings=(*record.findings, *seen.findings))
     words = counted(len(record.findings), "finding") if record.findings else "nothing suspicious"
     result = {
         "channels": [vars(row) for row in summary(record)],
         "norms": [vars(row) for row in norms(record)],
         "taken": dict(record.taken),
+        "rates": [vars(rate) for rate in rates],
+        "turns": None if seen is None else vars(seen),
     }
     estimate = timed(without_coefficients("inspect", words, result, record.sources, record.findings))
     if output.out is not None:
@@ -53,8 +59,11 @@ def inspect(
         write_text(output.report, render_inspection(record, estimate, inspection_pictures(record)))
         output.say(f"report: {output.report}")
     taken = [f"{sensor}: {of_sensor}" for sensor, of_sensor in record.taken.items()]
+    clocks = [*(rate.line for rate in rates), *([] if seen is None else [seen.line])]
     findings = [finding.line for finding in record.findings] or [words]
-    text = "\n".join([channels_table(record).text(), "", *(taken if map_file is not None else ()), *findings])
+    text = "\n".join(
+        [channels_table(record).text(), "", *(taken if map_file is not None else ()), *clocks, *findings]
+    )
     emit(estimate, text, output)
 
 

@@ -38,6 +38,7 @@ CODES: dict[str, Code] = {
     "gap": Code("samples are missing", _NEVER, rank=15),
     "duplicate_time": Code("a time stamp is repeated", _NEVER),
     "backward_time": Code("time runs backward", _NEVER),
+    "arrival_stamps": Code("time stamps are of arrival, and even steps stand in their place", _NEVER),
     "outlying_time": Code("a time stamp is wrong, and set aside", _NEVER),
     "nan": Code("values are missing or not numbers", _NEVER),
     "bad_row": Code("rows that cannot be read as numbers", _NEVER),

@@ -84,5 +84,26 @@ class Limits:
     seen_rate_high: float = 1.18
     """Turns that a gyro shows, over those that accelerometers see, above which its unit is contradicted."""
 
+    typed_rate: float = 0.05
+    """Share by which a gyro may show other turns than accelerometers do at a sample rate that was typed."""
+
+    arrival_rows: int = 200
+    """Stamps from which on it is told whether they are of arrival, and kinds of steps at most of coarse ones."""
+
+    mean_from_median: float = 0.01
+    """Share by which mean and median step differ, or of stamps that repeat, from which stamps may be of arrival."""
+
+    long_steps: float = 0.1
+    """Share of long steps from which they are no gaps but pauses between bursts."""
+
+    mean_of_bursts: float = 1.2
+    """Mean step over the short one from which stamps come in bursts."""
+
+    lost_rows: float = 4.0
+    """Long steps, in short ones, below which whole numbers of them are lost rows."""
+
+    burst_pieces: float = 0.2
+    """Share by which the mean step of a twentieth may differ from that of all, where stamps are bursts."""
+
 
 LIMITS = Limits()

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
+from inercal.foundation.records.arrival import evenly
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.limits import LIMITS
 from inercal.foundation.records.places import counted, places
@@ -187,7 +188,8 @@ def outlying(t: Array) -> NDArray[np.int64]:
 
 
 def with_sound_stamps(columns: Mapping[str, Column]) -> tuple[dict[str, Column], tuple[Finding, ...]]:
-    """Columns by name on time axes whose wrong stamps are NaN, and ``outlying_time`` on each axis that has some."""
+    """Columns by name on time axes whose wrong stamps are NaN, and those of arrival even steps, with a finding on each
+    such axis."""
     clocks = {id(column.t): column for column in columns.values()}
     axes, findings = {}, list[Finding]()
     for key, column in clocks.items():
@@ -198,6 +200,8 @@ def with_sound_stamps(columns: Mapping[str, Column]) -> tuple[dict[str, Column],
             axes[key] = column.t.copy()
             axes[key][rows] = np.nan
             findings.append(_finding(column.t, axes[key], rows, subject))
+        axes[key], of_arrival = evenly(axes[key], subject)
+        findings += [] if of_arrival is None else [of_arrival]
     kept = {
         name: column if axes[id(column.t)] is column.t else replace(column, t=axes[id(column.t)])
         for name, column in columns.items()

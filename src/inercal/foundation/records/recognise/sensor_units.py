@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -150,7 +151,15 @@ def contradiction(ratio: float) -> str:
     return f", though it shows {ratio:.3g} times the turns that the accelerometers see{cause}"
 
 
-def turned_otherwise(seen: SeenTurns | None) -> str:
+class WithAxes(Protocol):
+    """Turns that accelerometers see, by the axes of a gyro."""
+
+    @property
+    def axes(self) -> tuple[int, int, int]:
+        """As of `inercal.foundation.records.recognise.physics.SeenTurns`."""
+
+
+def turned_otherwise(seen: WithAxes | None) -> str:
     """The axes of a gyro that turn about others than the accelerometers see, or the other way, in words."""
     if seen is None:
         return ""
