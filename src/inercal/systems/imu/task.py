@@ -129,14 +129,10 @@ def _by_method(
             from inercal.systems.imu.aided.calibration import calibrate_aided
 
             return calibrate_aided(record, settings, settings.method, progress)
-        case SectionsSettings():
+        case SectionsSettings() | None:
             from inercal.systems.imu.sections.outcome import calibrate_from_sections
 
             return calibrate_from_sections(records, settings, settings.method, progress)
-        case None:
-            from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
-
-            return calibrate_multiposition(record, settings, progress)
 
 
 def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:

@@ -131,6 +131,9 @@ class Limits:
     open_scale: float = 0.5
     """Relative standard deviation of a scale of the gyro that nothing but moves tells."""
 
+    harmless_wander: float = 0.3
+    """Angle by which a bias off its mean turns moves, over their scatter, up to which it is left to that."""
+
     raised_u: float = 1.2
     """Growth of u of the accelerometers by moves, from which these have no say in them."""
 

@@ -70,11 +70,14 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
 
 
 def _full_scale(problem: Problem, p: int) -> float:
-    """The largest output of the triad of a bias, that by g-sensitivity among them; 1 for any other coefficient."""
+    """The largest output of the triad of a bias, that by g-sensitivity among them; of a scale factor what is guessed of
+    it; 1 for any other coefficient."""
     name, y = COEFFICIENTS[p], problem.readings.y
     if name.startswith("K0"):
         return float(np.nanmax(np.abs(y[:, :2])))
     if name.startswith("D_F"):
         drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
         return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)
+    if name.startswith(("K1", "S")):
+        return max(abs(float(first_guess(problem).x[p])), 1e-12)
     return 1.0

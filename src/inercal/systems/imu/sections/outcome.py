@@ -17,6 +17,7 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
+from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
@@ -26,13 +27,15 @@ from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
 from inercal.systems.imu.sections.cutting.between import SwingStretch
+from inercal.systems.imu.sections.cutting.by_hand import by_hand
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
-from inercal.systems.imu.sections.move_findings import findings_of_moves
+from inercal.systems.imu.sections.move_findings import findings_of_moves, of_channels
 from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.resolution import resolution_finding, with_resolution
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
@@ -53,20 +56,23 @@ _OWN = "z along the input axis of accelerometer z, y in the plane of the input a
 @short_repr
 @dataclass(frozen=True, eq=False)
 class CalibrationFromSections:
-    """An ``estimate``, the ``sections`` that were read, and the calibration ``found``, if any."""
+    """An ``estimate``, the ``sections`` that were read, and, where there was a fit, the calibration ``found`` and the
+    ``proposal`` with the recordings."""
 
     estimate: Estimate
     sections: tuple[Section, ...]
     found: SectionCalibration | None = None
+    proposal: Proposal | None = None
 
 
 def calibrate_from_sections(
     records: Sequence[Record],
     settings: ImuSettings,
-    options: SectionsSettings,
+    options: SectionsSettings | None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
-    """Calibrate from the sections that a study states, or that names and recordings tell.
+    """Calibrate from the sections that a study states, or that names and recordings tell; without ``options`` from the
+    poses of one log in the hand and the moves between them.
 
     Raises
     ------
@@ -76,14 +82,20 @@ def calibrate_from_sections(
     clock = time.perf_counter()
     progress("reading the sections")
     named = by_file(records)
-    refuse_samples(named)
+    if options is None:
+        ((name, record),) = named.items()
+        proposal = by_hand(name, record, settings)
+        sections = proposal.sections
+    else:
+        refuse_samples(named)
+        proposal = _proposal(named, options)
+        sections = tuple(_placed(section, options) for section in proposal.sections)
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    proposal = _proposal(named, options)
-    sections = tuple(_placed(section, options) for section in proposal.sections)
     findings = (*_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
     bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    none: Mapping[str, Any] = {"method": "sections", "sections": []}
+    method = "multiposition" if options is None else "sections"
+    none: Mapping[str, Any] = {"method": method, "sections": []}
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(
@@ -94,7 +106,8 @@ def calibrate_from_sections(
         estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     priors = _priors(settings, units)
-    lacking = missing(sections, priors)
+    # moves tell the gyro's scale
+    lacking = missing([replace(s, gyro=None) for s in sections] if proposal.moves else sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
         cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
@@ -102,18 +115,31 @@ def calibrate_from_sections(
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     progress("fitting the sections")
+    used = 0
     try:
         if proposal.moves:
             moved = calibrate_with_moves(sections, [one.move for one in proposal.moves], priors)
-            found, findings = moved.calibration, (*findings, *findings_of_moves(moved, proposal.moves))
+            found, asked = moved.calibration, of_channels(moved)
+            findings = (
+                *findings,
+                *asked,
+                *findings_of_moves(moved, proposal.moves, numbered=options is None),
+            )
+            proposal = replace(proposal, questions=(*proposal.questions, *asked))
+            used = len(moved.used)
         else:
             found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
-    estimate = _estimate(found, settings, records, units, proposal, findings)
-    return CalibrationFromSections(timed(estimate, clock), sections, found)
+    if units["gyro"] is not None:
+        steps = np.array(proposal.steps)
+        found = with_resolution(found, steps)
+        findings = (*findings, *resolution_finding(steps, units["gyro"].unit.symbol))
+    estimate = _estimate(found, settings, records, units, proposal, findings, used)
+    estimate = replace(estimate, result={**estimate.result, "method": method})
+    return CalibrationFromSections(timed(estimate, clock), sections, found, proposal)
 
 
 def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
@@ -262,8 +288,9 @@ def _estimate(
     units: Mapping[str, Triad | None],
     proposal: Proposal,
     findings: Sequence[Finding],
+    moves: int,
 ) -> Estimate:
-    """Put the estimate together."""
+    """Put the estimate together; so many ``moves`` were used."""
     triads = {sensor: triad for sensor, triad in units.items() if triad is not None}
     symbols = {sensor: triad.unit.symbol for sensor, triad in triads.items()}
     g, readings = settings.site.gravity, found.problem.readings
@@ -291,7 +318,7 @@ def _estimate(
         ],
         found.x,
         Uncertainty(found.covariance, found.dof, budget),
-        verdict(found, proposal.questions),
+        _verdict(found, proposal, moves),
         findings=(*findings, *findings_of(found)),
         statistics={
             "dof": found.freedom,
@@ -309,6 +336,19 @@ def _estimate(
             "unit": symbols,
         },
     )
+
+
+def _verdict(found: SectionCalibration, proposal: Proposal, moves: int) -> tuple[Status, str]:
+    """Status and message, in which moves count as well."""
+    status, message = verdict(found, proposal.questions)
+    if status is not Status.OK or not proposal.moves:
+        return status, message
+    if not moves:
+        return (
+            Status.TOO_FEW_INTERVALS,
+            f"{message}; no move between them can be used, so that the gyro is not calibrated: see the findings",
+        )
+    return status, f"{message} and {counted(moves, 'move')}"
 
 
 def _of_moves(proposal: Proposal) -> list[Mapping[str, Any]]:

@@ -193,17 +193,26 @@ def _known(row: SectionRow) -> Section:
     )
 
 
+def calm_part(gyro: TriadSamples) -> TriadSamples:
+    """The samples of a gyro in a rest that are as calm as in its middle: a motion that begins or ends slowly does no
+    harm to the mean of accelerometers, but to that of a gyro."""
+    n, block = len(gyro.t), max(round(FINDING.still_window / FINDING.blocks_of_window / gyro.step), 2)
+    if n < 4 * FINDING.blocks_of_window * block // 2:
+        return gyro
+    begin, end = still_edges(gyro.values, n // 4, n - n // 4, block, 0.0)
+    part = slice(begin, end)
+    return TriadSamples(gyro.t[part], gyro.values[part], gyro.clipped[part])
+
+
 def _steady(stretch: Stretch) -> _Read | str:
     """A rest or a steady rate; what is wrong with it, in words. Of a rate the accelerometers are left out."""
     row = stretch.row
     if row.kind == "rate" and row.rate is None:
         return "its rate is not stated"
-    acc = stretch.acc if row.kind == "rest" else None
-    triads = {
-        sensor: one
-        for sensor, one in (("acc", acc), ("gyro", stretch.gyro))
-        if one is not None and len(one.t)
-    }
+    acc, gyro = stretch.acc if row.kind == "rest" else None, stretch.gyro
+    if row.kind == "rest" and gyro is not None:
+        gyro = calm_part(gyro)
+    triads = {sensor: one for sensor, one in (("acc", acc), ("gyro", gyro)) if one is not None and len(one.t)}
     clipped = [sensor for sensor, one in triads.items() if one.clipped.mean() > LIMITS.clipped_part]
     whole = {sensor: one for sensor, one in triads.items() if sensor not in clipped}
     if not whole:

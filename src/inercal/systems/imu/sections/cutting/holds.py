@@ -1,7 +1,7 @@
 """Holds of a recording: where the instrument stands still, for accelerometers and for gyros each by their own evidence.
 
 The variance in windows of 0.4 s has two humps on a logarithmic scale, of rest and of motion; still is what lies below
-the valley between them. Of several valleys (table, hand, motion) the one is taken that gives most poses in sound holds.
+the valley between them. Of several valleys (table, hand, motion) the one is taken whose poses fix most (`choice`).
 Each hold is grown to where it stops being still, and judged: by the drift of its outputs, and by the mean of the gyro
 against that of the others, for a smooth turn about the vertical leaves the accelerometers as they are.
 """
@@ -15,6 +15,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.dwells import Dwell, breaks
+from inercal.systems.imu.sections.cutting.choice import HoldSet, best
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.windows import Places, Windows, valleys
 
@@ -70,7 +71,12 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
             for level in windows.levels(cap)
             for gate in sorted({*(max(gate, harmless) for gate in gates), np.inf})
         ]
-        held = _best([(gate, stretches, *windows.poses(stretches)) for gate, stretches in sets])
+        noise = float(np.sqrt(np.nanmin(windows.variance) / block)) / max(windows.gravity, 1e-300)
+        held = best(
+            [HoldSet(gate, stretches, windows.poses(stretches)) for gate, stretches in sets],
+            max(windows.gravity, 1e-300),
+            noise,
+        )
     if turning is not None and unrest is not None:
         rests = [turning.stretches(unrest[0] + unrest[1] < gate, shortest) for gate in gates or [np.inf]]
         resting = max(rests, key=len)
@@ -134,21 +140,6 @@ def _block(t: Array) -> int:
 def _cuts(t: Array) -> Places:
     """Rows before which time breaks."""
     return breaks(t, 0.5 * LIMITS.still_window + 3.0 * _step(t))
-
-
-def _best(sets: Sequence[tuple[float, list[Dwell], int, int]]) -> list[Dwell]:
-    """The best of sets of holds, from the calmest on, each with its gate, its poses and its blocks.
-
-    Most poses first; then the least turning that gives them; then the calmest that keeps most of the time, for slow
-    motions add time as well.
-    """
-    most = max(poses for _, _, poses, _ in sets)
-    gate = min(gate for gate, _, poses, _ in sets if poses == most)
-    left = [
-        (blocks, stretches) for turning, stretches, poses, blocks in sets if (turning, poses) == (gate, most)
-    ]
-    longest = max(blocks for blocks, _ in left)
-    return next(stretches for blocks, stretches in left if blocks >= LIMITS.kept_time * longest)
 
 
 def _harmless(windows: Windows, turning: Array, time: float) -> float:
