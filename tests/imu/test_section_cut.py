@@ -109,7 +109,8 @@ def test_the_integral_of_a_turn_errs_by_its_noise():
     known = row("turn", angle=quantity_of(2.0 * np.pi, 0.0, "deg"))
     for seed in range(200):
         t, _, gyro, _ = a_turn(2.0 * np.pi, 4.0, seed=seed)
-        (one,) = cut([Stretch(known, None, samples(t, gyro))]).sections
+        one, *ends = cut([Stretch(known, None, samples(t, gyro))]).sections
+        assert [end.kind for end in ends] == ["rest", "rest"]
         errors.append((one.gyro[2] - 0.03 - 1.02 * 2.0 * np.pi / one.duration) / np.sqrt(one.gyro_var[2]))
     assert abs(np.mean(errors)) < 4.0 / np.sqrt(200)
     assert 0.85 < np.std(errors) < 1.15

@@ -52,7 +52,7 @@ def changed(sections, name, **fields):
 def test_sound_sections_are_ok(sound, unit):
     status, _, findings = judged(sound, unit)
     assert status is Status.OK
-    assert set(findings) <= {"by_prior", "scatter_by_prior"}
+    assert set(findings) <= {"by_prior", "scatter_by_prior", "stated_exact"}
     assert {item["term"] for item in findings["by_prior"].items} >= {"K2_x", "K2_y", "K2_z"}
 
 
@@ -146,7 +146,7 @@ def test_too_few_rests_name_the_pose_to_add(unit):
     ]  # x and y up and down, never z
     found = missing(sections, Priors(site(unit)))
     assert found is not None
-    assert "z" in found.pose or found.terms
+    assert "z" in found.cure or found.terms
     for section in sections:
         assert section.up is None
     assert missing(poses(Bench(unit), 12), Priors(site(unit))) is None

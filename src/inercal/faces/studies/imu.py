@@ -146,10 +146,10 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     ] = Field(
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
-        "turns by a known angle; aided: on a table whose angles are in the record; means: a row of mean outputs for "
-        "each pose, accelerometers; known_rates: a gyro on a platter or rate table, in unknown orientations; "
-        "known_turns: a gyro, a turn by a known angle about each axis; sections: rests, rates and turns, each with "
-        "what is known of it",
+        "turns by a known angle; aided: on a table whose angles are in the record; sections: rests, rates and turns, "
+        "each with what is known of it; shorthands of sections are means: accelerometers, a row of mean outputs for "
+        "each rest in an unknown direction; known_rates: a gyro on a platter or rate table, in unknown orientations; "
+        "known_turns: a gyro, a turn by a known angle about each axis",
     )
     sections: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
@@ -184,8 +184,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     )
     alignment: Annotated[Quantity, QuantityText("angle", "0.1 deg", TILT.accept, TILT.words)] | None = Field(
         default=None,
-        description="of known_turns: standard uncertainty of the direction of the axis of each turn; taken as square "
-        "to each other if absent",
+        description="of known_turns: standard uncertainty of the direction of the axis of each turn; not known if "
+        "absent, some 0.3 deg",
     )
     k2: bool | Typed = Field(
         default=False,

@@ -83,7 +83,7 @@ def _turns() -> Array:
         _record("gyro", angle * np.outer(rate, gain[:, j]) + 3.0 + tremble, t)
         for j, angle in enumerate(_ANGLES)
     ]
-    options = KnownTurnsSettings(tuple(_ANGLES.tolist()), (0.0, 0.0, 0.0))
+    options = KnownTurnsSettings(tuple(_ANGLES.tolist()), (0.0, 0.0, 0.0), 0.0)
     estimate = calibrate_files(records, ImuSettings(Site(_G), method=options)).estimate
     made = np.array(
         [

@@ -9,12 +9,6 @@ from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.aided.figures import pictures as of_aided
 from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
 from inercal.systems.imu.ferraris.figures import pictures as of_ferraris
-from inercal.systems.imu.known_rates.calibration import KnownRatesCalibration
-from inercal.systems.imu.known_rates.figures import pictures as of_known_rates
-from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
-from inercal.systems.imu.known_turns.figures import pictures as of_known_turns
-from inercal.systems.imu.means.calibration import MeansCalibration
-from inercal.systems.imu.means.figures import pictures as of_means
 from inercal.systems.imu.multiposition.figures import pictures as of_multiposition
 from inercal.systems.imu.sections.figures import pictures as of_sections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
@@ -23,13 +17,7 @@ if TYPE_CHECKING:
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
 
     AnyCalibration: TypeAlias = (
-        MultipositionCalibration
-        | FerrarisCalibration
-        | AidedCalibration
-        | MeansCalibration
-        | KnownRatesCalibration
-        | KnownTurnsCalibration
-        | CalibrationFromSections
+        MultipositionCalibration | FerrarisCalibration | AidedCalibration | CalibrationFromSections
     )
 
 
@@ -45,12 +33,6 @@ def pictures(calibration: AnyCalibration) -> list[Picture]:
             return of_ferraris(calibration)
         case AidedCalibration():
             return of_aided(calibration)
-        case MeansCalibration():
-            return of_means(calibration)
-        case KnownRatesCalibration():
-            return of_known_rates(calibration)
-        case KnownTurnsCalibration():
-            return of_known_turns(calibration)
         case CalibrationFromSections():
             return of_sections(calibration)
         case _:

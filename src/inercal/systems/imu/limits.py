@@ -120,26 +120,11 @@ class Limits:
     most_poses: int = 100
     """Rows from which most being like the one before are samples of a recording, not means of poses."""
 
-    shortest_steady: float = 3.0
-    """Shortest stretch [s] of steady output that counts as an orientation on a table that turns."""
-
-    rows_of_a_rate: int = 12
-    """Rows of each rate from which every rate has a scatter of its own."""
-
-    rows_at_rest: int = 3
-    """Rows at rest from which these have a scatter of their own."""
-
-    shortest_turn_rest: float = 1.0
-    """Shortest rest [s] before and after a turn by a known angle."""
-
     turn_margin: float = 0.1
     """Time [s] by which a turn is taken longer at either end than its rate shows."""
 
     turn_noise: float = 4.0
     """Size of a gyro's smoothed output, over that at rest (rms), from which it turns."""
-
-    turn_onset: float = 1e-3
-    """Rate, as a part of the largest of a turn, from which it turns in any case."""
 
     # Ferraris: sections
 

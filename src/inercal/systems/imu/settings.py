@@ -84,12 +84,18 @@ class AidedSettings:
 
 @dataclass(frozen=True)
 class MeansSettings:
-    """Options of a calibration by pose means, a row for each pose: there are none."""
+    """A shorthand of sections: rests of unknown direction, a row of means for each; there are no options."""
 
 
 @dataclass(frozen=True)
 class KnownRatesSettings:
-    """Options of a gyro's calibration at known rates: ``rates`` (k,) [rad/s], one a record, and their ``rates_u``."""
+    """A shorthand of sections: a gyro at known rates about unknown axes, and rests.
+
+    Attributes
+    ----------
+    rates, rates_u : (k,)
+        Rate of each record [rad/s], and its standard uncertainty, one error for all of it.
+    """
 
     rates: tuple[float, ...]
     rates_u: tuple[float, ...]
@@ -97,7 +103,7 @@ class KnownRatesSettings:
 
 @dataclass(frozen=True)
 class KnownTurnsSettings:
-    """Options of a gyro's calibration by turns by known angles, about x, y and z.
+    """A shorthand of sections: a gyro, turned by known angles about x, y and z.
 
     Attributes
     ----------
@@ -114,7 +120,7 @@ class KnownTurnsSettings:
 
 @dataclass(frozen=True)
 class SectionsSettings:
-    """Options of a calibration from sections.
+    """Options of a calibration from sections, of each of which is stated what is known.
 
     Attributes
     ----------

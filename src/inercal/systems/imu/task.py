@@ -27,21 +27,10 @@ from inercal.systems.imu.settings import (
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
     from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.systems.imu.known_rates.calibration import KnownRatesCalibration
-    from inercal.systems.imu.known_turns.calibration import KnownTurnsCalibration
-    from inercal.systems.imu.means.calibration import MeansCalibration
     from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
     from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-    Calibrated = (
-        MultipositionCalibration
-        | FerrarisCalibration
-        | AidedCalibration
-        | MeansCalibration
-        | KnownRatesCalibration
-        | KnownTurnsCalibration
-        | CalibrationFromSections
-    )
+    Calibrated = MultipositionCalibration | FerrarisCalibration | AidedCalibration | CalibrationFromSections
 
 
 def in_order(settings: ImuSettings) -> bool:
@@ -109,18 +98,6 @@ def _by_method(
     """The calibration by the method of the settings; only its module is loaded."""
     record = records[0]
     match settings.method:
-        case KnownRatesSettings():
-            from inercal.systems.imu.known_rates.calibration import calibrate_known_rates
-
-            return calibrate_known_rates(records, settings, settings.method, progress)
-        case KnownTurnsSettings():
-            from inercal.systems.imu.known_turns.calibration import calibrate_known_turns
-
-            return calibrate_known_turns(records, settings, settings.method, progress)
-        case MeansSettings():
-            from inercal.systems.imu.means.calibration import calibrate_means
-
-            return calibrate_means(record, settings, progress)
         case FerrarisSettings():
             from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 
@@ -129,7 +106,7 @@ def _by_method(
             from inercal.systems.imu.aided.calibration import calibrate_aided
 
             return calibrate_aided(record, settings, settings.method, progress)
-        case SectionsSettings() | None:
+        case SectionsSettings() | MeansSettings() | KnownRatesSettings() | KnownTurnsSettings() | None:
             from inercal.systems.imu.sections.outcome import calibrate_from_sections
 
             return calibrate_from_sections(records, settings, settings.method, progress)

@@ -199,6 +199,23 @@ class Linear:
         by_local = cells.gather @ np.einsum("ckq,mck->cqm", cells.L, weighed).reshape(-1, count)
         return np.asarray((by_shared - by_local.T @ solution.carried) @ solution.covariance)
 
+    def scores(self, z: Array, solution: ArrowSolution, effects: Array) -> tuple[Array, Array]:
+        """Scores (k,) and information (k, k) of ``effects`` (k, c, 9) on the means that are no unknowns.
+
+        Their sizes would be information^-1 times scores; the sum of squares would fall by scores times sizes.
+        """
+        cells, count = self._blocks[0], len(effects)
+        weighed = cells.used / self.variances(z)[0] * effects
+        by_local = cells.gather @ np.einsum("ckq,mck->cqm", cells.L, weighed).reshape(-1, count)
+        shared = self.displaced(z, solution, effects)
+        local = (solution.given @ by_local).T - shared @ solution.carried.T
+        inside = np.pad(local, ((0, 0), (0, 1)))[:, cells.at]
+        left = effects - (shared @ cells.A.T).reshape(effects.shape)
+        left -= np.einsum("ckq,mcq->mck", cells.L, inside)
+        rest = self.left(z, solution)[0][0]
+        scores = np.einsum("mck,ck->m", weighed, rest)
+        return scores, np.asarray(np.einsum("mck,nck->mn", weighed, left))
+
     def likelihood(self, z: Array) -> float:
         """Restricted log likelihood with the prior of the components."""
         return self.at(z).value - 0.5 * float(np.sum(((z - self.sizes[:, 0]) / self.sizes[:, 1]) ** 2))

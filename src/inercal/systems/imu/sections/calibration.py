@@ -24,11 +24,14 @@ from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import solved
 from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K1, LOCAL, SWIVEL, TILT, S
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, K1, LOCAL, SWIVEL, TILT, S
 
-_SOFTENED: Final = (1e-3, 3e-5, 1e-6)
+SOFTENED: Final = (1e-3, 3e-5, 1e-6)
 """Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
 tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
+
+_FINEST: Final = 1e-9
+"""Noise of means, as a part of the largest output, that counts at least: rounding rules below."""
 
 _SOFT: Final = 100.0
 """Growth of a variance up to which it makes no other valley."""
@@ -81,6 +84,8 @@ class SectionCalibration:
     """Angles (n, 2) by which verticals and axes lie off what is said of them [rad], 0 where nothing is."""
     placed_sigmas: Array
     """The same over what was known of them."""
+    pulled_rates: dict[str, float]
+    """Errors of rates that sections share as found, in the standard deviations that they have where all is sound."""
     converged: bool
     problem: Problem
     point: Iterate
@@ -160,7 +165,8 @@ def contradicted(found: SectionCalibration) -> bool:
 
 def _calibrated(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    found = _result(_fit(problem_of(sections, priors, extras)))
+    problem = problem_of(sections, priors, extras)
+    found = _result(_fit(softened(problem, _FINEST) or problem))
     new = {sensor for sensor, p in found.agreement.items() if p < LIMITS.contradiction} - priors.excess
     if new:
         return _calibrated(sections, replace(priors, excess=priors.excess | new), extras)
@@ -182,8 +188,8 @@ def _fit_by(problem: Problem, *, whole: bool) -> _Fit:
     z, point = np.array([np.log(size.median) for size in problem.sizes.values()]), first_guess(problem)
     spread, noise = np.eye(len(z)), _noise(problem, point, z)
     problem = with_classes(problem, noise)
-    for part in _SOFTENED:
-        softer = _softened(problem, part)
+    for part in SOFTENED:
+        softer = softened(problem, part)
         if softer is not None:
             point, _, _ = solved(softer, point, z)
     for _ in range(3):
@@ -198,8 +204,8 @@ def _fit_by(problem: Problem, *, whole: bool) -> _Fit:
     return _Fit(problem, point, linear, z, spread, converged)
 
 
-def _softened(problem: Problem, part: float) -> Problem | None:
-    """The problem with a noise of means of at least this part of the largest outputs; None where it is no less."""
+def softened(problem: Problem, part: float) -> Problem | None:
+    """The problem with a noise of means of at least this ``part`` of the largest outputs; None where it is no less."""
     r = problem.readings
     largest = np.array(
         [np.max(np.abs(r.y[:, kinds][r.seen[:, kinds]]), initial=0.0) for kinds in ([0, 1], [2])]
@@ -312,10 +318,24 @@ def _result(fit: _Fit) -> SectionCalibration:
         outlying=outlying(linear, z, best) if fit.converged else np.ones(len(x[problem.shared :]) // LOCAL),
         placed=placed,
         placed_sigmas=sigmas,
+        pulled_rates=_pulled_rates(problem, fit.point, linear, best),
         converged=fit.converged,
         problem=problem,
         point=fit.point,
     )
+
+
+def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowSolution) -> dict[str, float]:
+    """Errors of the rates of groups, over the part of their standard deviation that the sections take away."""
+    out, at = {}, linear.shared.tolist()
+    for k, name in enumerate(problem.readings.rate_groups):
+        p = COMMON + k
+        if p in at:
+            j = at.index(p)
+            told = problem.sd[p] ** 2 - best.covariance[j, j]
+            if told > LIMITS.told_rate * problem.sd[p] ** 2:
+                out[name] = float((point.x[p] + best.shared[j]) / np.sqrt(told))
+    return out
 
 
 def _in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:

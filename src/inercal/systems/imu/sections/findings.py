@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.special import chdtrc
 
 from inercal.foundation.findings import EVERYTHING, Finding, Status
 from inercal.foundation.records.places import counted, counted_names
@@ -13,6 +14,7 @@ from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.calibration import SectionCalibration, contradicted
 from inercal.systems.imu.sections.cutting.checks import direction
 from inercal.systems.imu.sections.limits import LIMITS
+from inercal.systems.imu.sections.unknowns import G
 
 _WORDS = {
     "acc": "accelerometers",
@@ -27,9 +29,12 @@ def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
     return (
         *_contradictions(found),
         *_signs(found),
+        *_rates(found),
         *(() if found.problem.extras else _outlying(found)),
         *_scatters(found),
         *_placing(found),
+        *_exact(found),
+        *_g_sensitivity(found),
         *_by_prior(found),
     )
 
@@ -103,11 +108,30 @@ def _signs(found: SectionCalibration) -> Iterator[Finding]:
             )
 
 
+def _rates(found: SectionCalibration) -> Iterator[Finding]:
+    """The rate that fits the others least, where the sum of squares of all sections hides how little."""
+    group = max(found.pulled_rates, key=lambda name: abs(found.pulled_rates[name]), default="")
+    if group and chdtrc(len(found.pulled_rates), found.pulled_rates[group] ** 2) < LIMITS.contradiction:
+        size = abs(found.pulled_rates[group])
+        yield Finding(
+            "rate_suspect",
+            f"Rates contradict each other: that of {group} differs by {size:.1f} times what was stated.",
+            group,
+            EVERYTHING,
+            action="Check order, values and u of the rates, whether the gyro is linear, and its g-sensitivity, "
+            "which on a level table adds the same to every rate.",
+            items=tuple(
+                {"rate": name, "off [of its u]": round(float(pull), 1)}
+                for name, pull in found.pulled_rates.items()
+            ),
+        )
+
+
 def _outlying(found: SectionCalibration) -> Iterator[Finding]:
     """The section that lies farthest off all others, left out in turn."""
     p = found.outlying
     k = int(np.argmin(p))
-    if p[k] < IMU_LIMITS.outlier_risk / max(int(np.sum(p < 1.0)), 1):
+    if p[k] < IMU_LIMITS.outlier_risk / len(p):
         yield Finding(
             "outlying_section",
             f"{_section(found, k)} lies off what all other sections say (p = {p[k]:.1g}).",
@@ -172,6 +196,40 @@ def _placing(found: SectionCalibration) -> Iterator[Finding]:
             harm=(),
             action="Give those between which the instrument was not touched the same setup.",
         )
+
+
+def _exact(found: SectionCalibration) -> Iterator[Finding]:
+    """Rates and angles that were stated without an uncertainty."""
+    for kind, what, example in (("rate", "rate", "33.333(15) rpm"), ("turn", "angle", "361.338(5) deg")):
+        exact = [
+            section
+            for section in found.problem.readings.sections
+            if section.kind == kind and getattr(section, what) and not getattr(section, f"{what}_u")
+        ]
+        if exact:
+            yield Finding(
+                "stated_exact",
+                f"The {what} of {counted(len(exact), 'section')} is taken as exact: S is too sure by what it is not.",
+                counted_names([section.name for section in exact]),
+                action=f'State it with its uncertainty, such as "{example}".',
+            )
+
+
+def _g_sensitivity(found: SectionCalibration) -> Iterator[Finding]:
+    """The g-sensitivity of a gyro that looks like its scale, where specific force during steady rates is not known."""
+    readings, scales = found.problem.readings, [f"S_{axis}" for axis in "xyz" if f"S_{axis}" in found.names]
+    blind = readings.whole & readings.seen[:, 2].any(axis=1) & ~readings.has_force
+    if not scales or not blind.any() or np.any(found.problem.sd[G] > 0.0):
+        return
+    sure = min(u / abs(value) for value, u, _ in map(found.value, scales))
+    slowest = float(np.min(np.abs(readings.rate[blind])))
+    yield Finding(
+        "g_sensitivity",
+        f"Specific force is not known: a g-sensitivity of {math.degrees(sure * slowest):.2g} deg/s per g would shift "
+        "the scale factors by their u.",
+        harm=(),
+        action="Turn faster, or about a level axis, on which it averages out.",
+    )
 
 
 def _by_prior(found: SectionCalibration) -> Iterator[Finding]:

@@ -36,6 +36,9 @@ class Limits:
     suspect_section: float = 0.05
     """Probability of a section's distance from all others below which scatter is found without it."""
 
+    told_rate: float = 1e-3
+    """Share of the variance of a rate that the other sections take away, from which they tell its error."""
+
     large_placing: float = math.radians(10.0)
     """Placing [rad] that is named."""
 

@@ -9,8 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import LinAlgError
 
+from inercal.foundation.arrays import Array
+from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.sections.arrow import Linear
+from inercal.systems.imu.sections.calibration import SOFTENED, softened
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.priors import Priors
@@ -21,11 +24,10 @@ from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, K1, G, S
 
 
 class Missing(NamedTuple):
-    """Coefficients that stay open, by name, and in words a direction of specific force that tells most of them; empty
-    where they are the gyro's, which needs a rest in any pose."""
+    """Coefficients that stay open, by name, and in words the section that tells most of them."""
 
     terms: tuple[str, ...]
-    pose: str
+    cure: str
 
 
 def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...] = ()) -> Missing | None:
@@ -35,7 +37,10 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     if not terms:
         return None
     if all(name.startswith("D_F") for name in terms):
-        return Missing(terms, "")
+        return Missing(terms, "a rest")
+    if all(name.startswith(("D_F", "S_")) for name in terms):
+        axes = [name[-1] for name in terms if name.startswith("S_")]
+        return Missing(terms, f"a rate or turn about {counted_names(axes)}")
     told = any(s.kind == "rest" and s.up is not None for s in sections)
     x = first_guess(problem_of(sections, priors, extras)).x
     best, pose = np.inf, np.array([0.0, 0.0, 1.0])
@@ -48,12 +53,13 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
             worst = max(there[name] for name in terms)
             if worst < (1.0 - 1e-6) * best:
                 best, pose = worst, up
-    return Missing(terms, pose_words(pose))
+    return Missing(terms, f"a rest with {pose_words(pose)} up")
 
 
 def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> dict[str, float]:
     """Of each coefficient without a prior its u over that from which it is open, by name."""
     problem = problem_of(sections, priors, extras)
+    problem = softened(problem, SOFTENED[-1]) or problem  # what is open does not hang on noise that small
     point = centred(problem, first_guess(problem))
     linear = Linear(problem, point.x, rows(problem, point))
     z = np.array([np.log(size.median) for size in problem.sizes.values()])
@@ -64,20 +70,19 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     flat = [
         k for k, p in enumerate(linear.shared) if p < len(COEFFICIENTS) and not np.isfinite(problem.sd[p])
     ]
-    size = np.array([LIMITS.open_share * _full_scale(problem, int(linear.shared[k])) for k in flat])
+    full = [_full_scale(problem, int(linear.shared[k]), point.x) for k in flat]
+    size = LIMITS.open_share * np.array(full)
     u = np.sqrt(np.abs(np.diag(covariance)[flat]))
     return {COEFFICIENTS[linear.shared[k]]: float(part) for k, part in zip(flat, u / size, strict=True)}
 
 
-def _full_scale(problem: Problem, p: int) -> float:
-    """The largest output of the triad of a bias, that by g-sensitivity among them; of a scale factor what is guessed of
-    it; 1 for any other coefficient."""
+def _full_scale(problem: Problem, p: int, x: Array) -> float:
+    """The largest output of the triad of a bias, that by g-sensitivity among them; the size of a scale factor by the
+    unknowns ``x`` (p,); 1 for any other coefficient."""
     name, y = COEFFICIENTS[p], problem.readings.y
     if name.startswith("K0"):
         return float(np.nanmax(np.abs(y[:, :2])))
     if name.startswith("D_F"):
         drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
         return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)
-    if name.startswith(("K1", "S")):
-        return max(abs(float(first_guess(problem).x[p])), 1e-12)
-    return 1.0
+    return abs(float(x[p])) if name.startswith(("K1", "S_")) else 1.0

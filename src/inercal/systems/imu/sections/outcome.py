@@ -22,7 +22,7 @@ from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.result import Estimate, timed
-from inercal.foundation.units import RAW
+from inercal.foundation.units import RAW, Quantity
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
@@ -37,9 +37,17 @@ from inercal.systems.imu.sections.move_findings import findings_of_moves, of_cha
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.resolution import resolution_finding, with_resolution
 from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.shorthands import (
+    Shorthand,
+    alone,
+    gyro_of_means,
+    proposal_of,
+    word_of,
+)
 from inercal.systems.imu.sections.swung import calibrate_swing
+from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -51,6 +59,7 @@ REFERENCES = (
 )
 _KNOWN = "axes of the case, by the known directions and axes"
 _OWN = "z along the input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z"
+_OF_GYRO = "z along the input axis of gyro z, y in the plane of the input axes of gyros y and z"
 
 
 @short_repr
@@ -68,11 +77,11 @@ class CalibrationFromSections:
 def calibrate_from_sections(
     records: Sequence[Record],
     settings: ImuSettings,
-    options: SectionsSettings | None,
+    options: SectionsSettings | Shorthand | None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
-    """Calibrate from the sections that a study states, or that names and recordings tell; without ``options`` from the
-    poses of one log in the hand and the moves between them.
+    """Calibrate from the sections that a study states, that names and recordings tell, or that a shorthand stands for;
+    without ``options`` from the poses of one log in the hand and the moves between them.
 
     Raises
     ------
@@ -81,20 +90,27 @@ def calibrate_from_sections(
     """
     clock = time.perf_counter()
     progress("reading the sections")
-    named = by_file(records)
+    named, temperature = by_file(records), recorded_temperature(records[0])
     if options is None:
         ((name, record),) = named.items()
         proposal = by_hand(name, record, settings)
-        sections = proposal.sections
-    else:
+        sections, method, notes = proposal.sections, "multiposition", proposal.notes
+    elif isinstance(options, SectionsSettings):
         refuse_samples(named)
         proposal = _proposal(named, options)
         sections = tuple(_placed(section, options) for section in proposal.sections)
+        method, notes = "sections", proposal.notes
+    else:
+        named = {name: alone(record, options) for name, record in named.items()}
+        refuse_samples(named)
+        proposal = proposal_of(named, options, settings.exclude)
+        sections, method = proposal.sections, word_of(options)
+        notes = (*proposal.notes, *gyro_of_means(records, options))
+    records = list(named.values())
     units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    findings = (*_of_records(records), *proposal.questions, *proposal.notes)
+    findings = (*_of_records(records), *proposal.questions, *notes)
     sources = [source for record in records for source in record.sources]
     bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    method = "multiposition" if options is None else "sections"
     none: Mapping[str, Any] = {"method": method, "sections": []}
     if not sections and proposal.swings:
         progress("fitting the swing")
@@ -102,7 +118,8 @@ def calibrate_from_sections(
             timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
         )
     if not sections:
-        text = "found no section that can be read: state them in a table, imu.sections"
+        why = "; ".join(f"{name} {reason}" for name, reason in proposal.unused.items())
+        text = why or "found no section that can be read: state them in a table, imu.sections"
         estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     priors = _priors(settings, units)
@@ -110,8 +127,7 @@ def calibrate_from_sections(
     lacking = missing([replace(s, gyro=None) for s in sections] if proposal.moves else sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
-        cure = f"a rest with {lacking.pose} up" if lacking.pose else "a rest"
-        text = f"the sections leave {what} open: add {cure}"
+        text = f"the sections leave {what} open: add {lacking.cure}"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     progress("fitting the sections")
@@ -137,7 +153,9 @@ def calibrate_from_sections(
         steps = np.array(proposal.steps)
         found = with_resolution(found, steps)
         findings = (*findings, *resolution_finding(steps, units["gyro"].unit.symbol))
-    estimate = _estimate(found, settings, records, units, proposal, findings, used)
+    if isinstance(options, KnownRatesSettings):
+        findings = (*findings, *trend_findings(found))
+    estimate = _estimate(found, settings, records, units, proposal, findings, temperature, used)
     estimate = replace(estimate, result={**estimate.result, "method": method})
     return CalibrationFromSections(timed(estimate, clock), sections, found, proposal)
 
@@ -239,8 +257,8 @@ def refuse_samples(named: Mapping[str, Record]) -> None:
         if len(values) > IMU_LIMITS.most_poses and np.mean(alike) > 0.5:
             raise RecordError(
                 name,
-                f"found {len(values)} rows without times, most of them like the one before, expected a time column "
-                "t, or one row for each pose",
+                f"found {len(values)} rows, most of them like the one before, expected one row for each pose, or of "
+                'a recording a time column t and imu.method = "sections"',
             )
 
 
@@ -288,6 +306,7 @@ def _estimate(
     units: Mapping[str, Triad | None],
     proposal: Proposal,
     findings: Sequence[Finding],
+    temperature: Quantity | None,
     moves: int,
 ) -> Estimate:
     """Put the estimate together; so many ``moves`` were used."""
@@ -300,9 +319,8 @@ def _estimate(
     known = bool(
         np.any(readings.know_up & readings.has_force) or np.any(readings.know_axis & (readings.rate != 0.0))
     )
-    conditions = conditions_of(
-        settings, recorded_temperature(records[0]), ranges, frame=_KNOWN if known else _OWN
-    )
+    own = _OWN if "acc" in triads else _OF_GYRO
+    conditions = conditions_of(settings, temperature, ranges, frame=_KNOWN if known else own)
     sources = [source for record in records for source in record.sources]
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     budget = tuple(

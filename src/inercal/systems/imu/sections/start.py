@@ -49,7 +49,8 @@ def first_guess(problem: Problem) -> Iterate:
             x[gain] = (by_range if moving and not near else typical) / full
         x[gain], x[bias] = np.where(there, x[gain], 1.0), np.where(there, x[bias], 0.0)
         way = (y - x[bias]) / x[gain] * np.where(size[used] < 0.0, -1.0, 1.0)[:, None]
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        size_of = np.linalg.norm(way, axis=1, keepdims=True)
+        way = np.where(size_of > 0.0, way / np.where(size_of > 0.0, size_of, 1.0), [0.0, 0.0, 1.0])
         if kind == 0:
             lost = ~told[used] & ~r.tied[used]
             felt = np.sum(way * axis[used], axis=1) * (r.tied & ~r.forced)[used]

@@ -98,6 +98,12 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
                 unused[stretch.row.section] = one
             else:
                 read.append(one)
+                if (
+                    stretch.row.kind == "turn"
+                    and stretch.acc is None
+                    and not _rests_in(stretch.row, stretches)
+                ):
+                    read += _ends_of(one)
     sections = [one.section for one in read]
     for kinds in (("rest", "turn"), ("rate",)):
         places = [k for k, one in enumerate(read) if one.section.kind in kinds]
@@ -164,8 +170,8 @@ def _constant(densities: Array, weights: Array) -> bool:
     return bool(np.all(np.abs(logs[1:] - logs[0]) < FINDING.noise_change * chance))
 
 
-def _known(row: SectionRow) -> Section:
-    """A section with what its row says."""
+def section_of(row: SectionRow) -> Section:
+    """A section with what its row says, and nothing read yet; of a kind rest, rate or turn."""
     begin = "start" if row.begin is None else f"{row.begin:.2f} s"
     end = "end" if row.end is None else f"{row.end:.2f} s"
     times = "" if row.begin is None and row.end is None else f", {begin} to {end}"
@@ -221,11 +227,11 @@ def _steady(stretch: Stretch) -> _Read | str:
     means = {sensor: one.values.mean(axis=0) for sensor, one in whole.items()}
     if stretch.force is not None and len(stretch.force.t):
         means["force"] = stretch.force.values.mean(axis=0)
-    known = dataclasses.replace(
-        _known(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
+    section = dataclasses.replace(
+        section_of(row), duration=float(longest.t[-1] - longest.t[0]) + longest.step, **means
     )
     return _Read(
-        known,
+        section,
         (whole["acc"].values,) if "acc" in whole else (),
         (whole["gyro"].values,) if "gyro" in whole else (),
         len(whole["gyro"].t) if "gyro" in whole else 0,
@@ -259,7 +265,7 @@ def _turn(stretch: Stretch) -> _Read | str:
     angle = row.angle.value * (run @ run[-1]) / (run[-1] @ run[-1])
     cosine_sine = tuple(float(np.trapezoid(f(angle), t)) / duration for f in (np.cos, np.sin))
     section = dataclasses.replace(
-        _known(row),
+        section_of(row),
         gyro=np.asarray(np.trapezoid(values, t, axis=0) / duration),
         duration=duration,
         cosine_sine=(cosine_sine[0], cosine_sine[1]),
@@ -273,6 +279,30 @@ def _turn(stretch: Stretch) -> _Read | str:
         else:
             rests = ()
     return _Read(section, rests, (before, after), len(t))
+
+
+def _rests_in(row: SectionRow, stretches: Sequence[Stretch]) -> bool:
+    """True where a rest of the same file is a section of its own."""
+    return any(one.row.kind == "rest" and one.row.file == row.file for one in stretches)
+
+
+def _ends_of(turn: _Read) -> list[_Read]:
+    """The rests before and after a turn of a gyro alone, which tell its bias."""
+    step = turn.section.duration / max(turn.gyro_samples - 1, 1)
+    ends = []
+    for values, end in zip(turn.gyro, ("before", "after"), strict=True):
+        rest = Section(
+            "rest",
+            name=f"{turn.section.name}, {end}",
+            where=turn.section.where,
+            why=turn.section.why,
+            gyro=values.mean(axis=0),
+            duration=len(values) * step,
+            session=turn.section.session,
+            scatter=turn.section.scatter,
+        )
+        ends.append(_Read(rest, (), (values,), len(values)))
+    return ends
 
 
 def _integrals(t: Array, values: Array) -> Array:

@@ -11,6 +11,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.imu.sections.cutting.checks import direction
+from inercal.systems.imu.sections.cutting.cut import section_of
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.section import Section
@@ -71,7 +72,10 @@ def _with(row: SectionRow, vector: Array, is_direction: bool) -> SectionRow:
 
 
 def sections_of_means(rows: Sequence[SectionRow], means: Means) -> list[Section]:
-    """The sections of rows of means, in order; those without any output are left out."""
+    """The sections of rows of means, in order; those without any output are left out.
+
+    Raises `StudyError` for a row that is neither a rest nor a rate: a mean tells nothing of the motion of a turn.
+    """
     sections = []
     for k, row in enumerate(rows):
         acc, gyro = (
@@ -79,23 +83,17 @@ def sections_of_means(rows: Sequence[SectionRow], means: Means) -> list[Section]
         )
         if acc is None and gyro is None:
             continue
+        if row.kind not in ("rest", "rate"):
+            found = f"section {row.section}, kind"
+            raise StudyError(found, f"found {row.kind} of a row of means, expected rest or rate")
         sections.append(
-            Section(
-                kind="rest",
-                name=row.section,
+            replace(
+                section_of(row),
                 where=f"{row.file}, {row.section}",
-                why=row.why,
                 acc=acc,
                 acc_var=None if acc is None or means.acc_u is None else means.acc_u[k] ** 2,
                 gyro=gyro,
                 gyro_var=None if gyro is None or means.gyro_u is None else means.gyro_u[k] ** 2,
-                up=row.up,
-                up_u=row.placing,
-                force=row.force if isinstance(row.force, np.ndarray) else None,
-                setup=row.setup,
-                session=row.session,
-                scatter=row.scatter,
-                temperature=row.temperature,
             )
         )
     return sections

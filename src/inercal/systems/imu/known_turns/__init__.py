@@ -1,1 +1,0 @@
-"""A gyro alone, turned by known angles about each axis."""
