@@ -234,7 +234,7 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, time_base_u
+    static_start, g_sensitivity, time_base_u
         As their keys say.
     k2 : bool
         Second-order coefficients of the accelerometers are estimated.
@@ -256,16 +256,13 @@ class ImuSettings:
 
     site: Site
     static_start: float | None = quantity(
-        "length of the still period at the start; found automatically if absent", "time", example="50 s",
+        "length of the still period at the start; by the recording if absent", "time", example="50 s",
         bounds=TIME, kinds=("multiposition",),
     )  # fmt: skip
     g_sensitivity: bool = option(
         "also estimate how the gyro's drift depends on specific force",
         False,
         kinds=("multiposition", "aided"),
-    )
-    bias_drift: bool = option(
-        "also estimate how the gyro's bias drifts with time", False, kinds=("multiposition",)
     )
     k2: bool = False
     k2_u: float | None = None

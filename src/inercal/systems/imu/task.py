@@ -27,10 +27,9 @@ from inercal.systems.imu.settings import (
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
     from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
-    from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
     from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-    Calibrated = MultipositionCalibration | FerrarisCalibration | AidedCalibration | CalibrationFromSections
+    Calibrated = FerrarisCalibration | AidedCalibration | CalibrationFromSections
 
 
 def in_order(settings: ImuSettings) -> bool:
@@ -61,7 +60,7 @@ def calibrate(
 
     Returns
     -------
-    `inercal.systems.imu.multiposition.calibration.MultipositionCalibration`, or that of the method asked for
+    `inercal.systems.imu.sections.outcome.CalibrationFromSections`, or that of the method asked for
         An estimate and the evidence behind it; nothing is raised for a poor fit.
 
     Raises

@@ -34,8 +34,8 @@ class CarryingScale(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelOrder:
-    """What the channels x, y, z of a gyro seem to measure: the ``signs`` and places ``order`` of the axes of the
-    accelerometers, and by how much [rad] the channels as they stand miss the verticals."""
+    """Axes of the accelerometers, ``signs`` and places ``order``, that the channels x, y, z of a gyro seem to measure,
+    and the angle [rad] by which these miss the verticals as they stand."""
 
     order: tuple[int, ...]
     signs: tuple[float, ...]

@@ -45,6 +45,14 @@ from inercal.systems.imu.sections.shorthands import (
     word_of,
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
+from inercal.systems.imu.sections.tables import (
+    budget_item,
+    of_moves,
+    of_poses,
+    of_sections,
+    of_turns,
+    relative_alignment,
+)
 from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
 from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
@@ -123,6 +131,8 @@ def calibrate_from_sections(
         estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
     priors = _priors(settings, units)
+    if options is None:  # a bias that wanders from pose to pose is more than noise
+        priors = replace(priors, excess=frozenset({"gyro"}))
     # moves tell the gyro's scale
     lacking = missing([replace(s, gyro=None) for s in sections] if proposal.moves else sections, priors)
     if lacking is not None:
@@ -149,6 +159,8 @@ def calibrate_from_sections(
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
         return CalibrationFromSections(timed(estimate, clock), sections)
+    if options is None:
+        found = replace(found, excess=found.excess - {"gyro"})
     if units["gyro"] is not None:
         steps = np.array(proposal.steps)
         found = with_resolution(found, steps)
@@ -156,7 +168,10 @@ def calibrate_from_sections(
     if isinstance(options, KnownRatesSettings):
         findings = (*findings, *trend_findings(found))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature, used)
-    estimate = replace(estimate, result={**estimate.result, "method": method})
+    more: dict[str, Any] = {"method": method}
+    if options is None:
+        more |= {"intervals": of_poses(found, proposal), "turns": of_turns(found)}
+    estimate = replace(estimate, result={**estimate.result, **more})
     return CalibrationFromSections(timed(estimate, clock), sections, found, proposal)
 
 
@@ -324,7 +339,7 @@ def _estimate(
     sources = [source for record in records for source in record.sources]
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     budget = tuple(
-        _item(found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0})
+        budget_item(found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0})
         for source, shares in found.budget.items()
     )
     return Estimate.of(
@@ -343,14 +358,15 @@ def _estimate(
             "chi2": found.chi2,
             "probability": found.probability,
             "intervals": float(len(readings.sections)),
+            **({"turns": float(moves)} if moves else {}),
         },
         result={
             "method": "sections",
-            "sections": [*_table(found), *_of_moves(proposal)],
+            "sections": [*of_sections(found), *of_moves(proposal)],
             "unused": dict(proposal.unused),
             "by_prior": list(found.by_prior),
             "scatter": dict(found.scatter),
-            "relative_alignment": _relative_alignment(found),
+            "relative_alignment": relative_alignment(found),
             "unit": symbols,
         },
     )
@@ -367,60 +383,3 @@ def _verdict(found: SectionCalibration, proposal: Proposal, moves: int) -> tuple
             f"{message}; no move between them can be used, so that the gyro is not calibrated: see the findings",
         )
     return status, f"{message} and {counted(moves, 'move')}"
-
-
-def _of_moves(proposal: Proposal) -> list[Mapping[str, Any]]:
-    """One row for each move."""
-    return [{"section": one.name, "kind": "move", "where": one.where, "why": ""} for one in proposal.moves]
-
-
-def _relative_alignment(found: SectionCalibration) -> list[Mapping[str, Any]]:
-    """T - M, which says how the axes of the gyro lie to those of the accelerometers, and which navigation needs."""
-    names, values, covariance = found.relative_alignment()
-    u = np.sqrt(np.diag(covariance))
-    return [
-        {"term": name, "value_rad": float(value), "u_rad": float(size)}
-        for name, value, size in zip(names, values, u, strict=True)
-    ]
-
-
-def _item(found: SectionCalibration, source: str, share: Mapping[str, float]) -> BudgetItem:
-    """A line of the budget."""
-    noise = {"noise of the accelerometers": ("acc", "m/s^2"), "noise of the gyro": ("gyro", "rad/s")}
-    if source in noise:
-        sensor, unit = noise[source]
-        return BudgetItem(source, "A", found.noise.get(sensor, 0.0), unit, share, True)
-    if source == "placing" and "placing" in found.scatter:
-        return BudgetItem(source, "A", found.scatter["placing"], "rad", share, True)
-    problem = found.problem
-    sds = [float(problem.sd[p]) for p in np.flatnonzero(problem.free) if problem.source(int(p)) == source]
-    u = max((sd for sd in sds if math.isfinite(sd)), default=0.0)
-    units = {
-        "gravity": "m/s^2",
-        "earth rate": "rad/s",
-        "earth rate, level part": "rad/s",
-        "angles and rates": "rad/s",
-    }
-    units |= {"K2 of the accelerometers": "1/(m/s^2)", "g-sensitivity of the gyro": "(rad/s)/(m/s^2)"}
-    angles = ("mounting", "placing", "axes", "prior of M", "prior of T")
-    return BudgetItem(source, "B", u, units.get(source, "rad" if source in angles else "1"), share)
-
-
-def _table(found: SectionCalibration) -> list[Mapping[str, Any]]:
-    """One row for each section: what it is, what the fit leaves of it in its noise, how far it lies off its place."""
-    rows: list[Mapping[str, Any]] = []
-    readings = found.problem.readings
-    for k, section in enumerate(readings.sections):
-        row: dict[str, Any] = {
-            "section": section.name,
-            "kind": section.kind,
-            "where": section.where,
-            "why": section.why,
-        }
-        for sensor, kind in (("acc", 0), ("gyro", 2)):
-            seen = readings.seen[k, kind]
-            if seen.any():
-                row[f"{sensor}_residual"] = float(np.sqrt(np.mean(found.residuals[k, kind][seen] ** 2)))
-        row["off_its_place_rad"] = float(found.placed[k].max())
-        rows.append(row)
-    return rows

@@ -42,7 +42,7 @@ def resolution_finding(steps: Array, unit: str) -> Iterator[Finding]:
     if np.any(steps > 0.0):
         yield Finding(
             "resolution",
-            "The noise of the gyro at rest is below half a step of its output, so that averaging does not help.",
+            "The noise of the gyro at rest is below half a step of its output, which hides it.",
             action="Set a smaller range of the gyro, which has finer steps.",
             items=tuple(
                 {"axis": axis, f"step [{unit}]": float(step)}

@@ -49,7 +49,7 @@ class CalibrationWithMoves:
     rescaled: bool
     """True where moves deny the scale that was said of the gyro."""
     channels: ChannelOrder | None = None
-    """What the channels of the gyro seem to measure, where no scale carries the verticals: it is not calibrated."""
+    """Axes that the channels of the gyro seem to measure, where no scale carries the verticals: no fit was made."""
 
 
 def calibrate_with_moves(
@@ -77,8 +77,12 @@ def calibrate_with_moves(
     joint = calibrate_sections(sections, scaled, (extra,))
     wander = _wander(joint, extra)
     if wander is not None:
-        extra = move_rows(len(sections), [_less(move, wander) for move in kept], scaled)
-        joint = calibrate_sections(sections, scaled, (extra,))
+        less = move_rows(len(sections), [_less(move, wander) for move in kept], scaled)
+        without = calibrate_sections(sections, scaled, (less,))
+        chance = 1.0 / np.sqrt(2.0 * max(joint.scatter_dof["moves"], 1.0))
+        gained = np.log(joint.scatter["moves"] / without.scatter["moves"])
+        if without.converged and gained > LIMITS.raised_scatter * chance:  # else rests are restless, no bias
+            joint, extra = without, less
     spoiled = _spoiled(alone, joint)
     if spoiled:
         joint = _without_say(sections, scaled, extra, alone)
@@ -119,7 +123,7 @@ def _scaled(
     said = priors.gyro_scale
     rests = np.array([s.gyro for s in sections if s.gyro is not None and np.isfinite(s.gyro).all()])
     bias = np.median(rests, axis=0) if len(rests) else np.zeros(3)
-    coarse = CoarseMoves.of(moves, _verticals(alone), bias)
+    coarse = CoarseMoves.of(moves, directions_of(alone), bias)
     if said is not None and coarse.missed(said.median) < OF_ALL.vertical_miss:
         return priors, False, None
     best = coarse.best()
@@ -130,15 +134,15 @@ def _scaled(
     return replace(priors, gyro_scale=Size(best.scale, LIMITS.open_scale)), said is not None, None
 
 
-def _verticals(found: SectionCalibration) -> Array:
+def directions_of(found: SectionCalibration) -> Array:
     """Directions of specific force (n, 3) of a calibration."""
     x = found.point.x
     return np.asarray(verticals(found.problem, found.point, x[:COMMON], effective(found.problem, x)).real)
 
 
 def _wander(found: SectionCalibration, extra: MoveRows) -> Array | None:
-    """What the bias of the gyro is off its mean in each rest (n, 3) [output], as far as it is more than noise; None
-    where that hardly turns a move.
+    """Distance of the bias of the gyro from its mean in each rest (n, 3) [output], as far as it is more than noise;
+    None where that hardly turns a move.
 
     A bias that drifts is that of the rests beside a move, not their mean: their residuals, less the part of them that
     is noise.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from inercal.systems.imu.sections.cutting.log import never_held, of_holds, on_cl
 from inercal.systems.imu.sections.cutting.proposal import Proposal, RecordedTriads
 from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.settings import Exclusion, ImuSettings
-
-_GAP: Final = 1.0
-"""Time [s] in the place of a step backward."""
 
 
 def by_hand(name: str, record: Record, settings: ImuSettings) -> Proposal:
@@ -87,11 +83,9 @@ def by_hand(name: str, record: Record, settings: ImuSettings) -> Proposal:
             Finding("saturation", headline, name, (), action="Set a wider range of them.", items=items)
         )
     unused = {**left, **done.unused, **no_moves}
-    # a bias that wanders from pose to pose is more than noise
-    sections = tuple(replace(section, gyro_var=None) for section in done.sections)
     return Proposal(
         tuple(kept),
-        sections,
+        done.sections,
         unused,
         (),
         tuple(notes),
@@ -165,7 +159,7 @@ def _rising(samples: TriadSamples | None) -> TriadSamples | None:
         return samples
     step = np.diff(samples.t)
     usual = samples.step
-    step = np.where(step < 0.0, max(_GAP, 10.0 * usual), step)
+    step = np.where(step < 0.0, max(LIMITS.gap_of_joint, 10.0 * usual), step)
     t = samples.t[0] + np.concatenate([[0.0], np.cumsum(step)])
     first = np.flatnonzero(np.concatenate([[True], step > 0.0]))
     after = np.append(first, len(t)), np.append(t[first], t[-1] + usual)

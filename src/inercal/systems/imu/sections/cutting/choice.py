@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD
 from inercal.foundation.records.dwells import Dwell
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.windows import PoseMeans
-
-_COEFFICIENTS: Final = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +37,14 @@ def best(sets: Sequence[HoldSet], gravity: float, noise: float) -> list[Dwell]:
     time.
     """
     most = max(len(one.poses.means) for one in sets)
-    if most <= _COEFFICIENTS:
+    if most <= len(ACCELEROMETER_TRIAD):
         return _most(sets)
-    told = [(one, told_by(one.poses, gravity, noise)) for one in sets if len(one.poses.means) > _COEFFICIENTS]
-    least = max(value for _, value in told) - 2.0 * _COEFFICIENTS * np.log(LIMITS.worse_holds)
+    told = [
+        (one, told_by(one.poses, gravity, noise))
+        for one in sets
+        if len(one.poses.means) > len(ACCELEROMETER_TRIAD)
+    ]
+    least = max(value for _, value in told) - 2.0 * len(ACCELEROMETER_TRIAD) * np.log(LIMITS.worse_holds)
     good = [one for one, value in told if value >= least]
     gate = min(one.gate for one in good)
     return next(one.stretches for one in good if one.gate == gate)
@@ -73,13 +75,13 @@ def told_by(poses: PoseMeans, gravity: float, noise: float) -> float:
     variance = of_noise + LIMITS.usual_pose_scatter**2
     for _ in range(3):
         root = A / np.sqrt(variance)[:, None]
-        inside = np.linalg.inv(np.eye(_COEFFICIENTS) + root.T @ root)
+        inside = np.linalg.inv(np.eye(len(ACCELEROMETER_TRIAD)) + root.T @ root)
         rest = left - A @ (inside @ (root.T @ (left / np.sqrt(variance))))
         freedom = len(left) - float(np.trace(inside @ root.T @ root))
         own = (rest @ rest + LIMITS.usual_pose_scatter**2) / (freedom + 1.0)
         variance = of_noise + max(own - float(np.mean(of_noise)), 0.0) + 1e-12
     root = A / np.sqrt(variance)[:, None]
-    return float(np.linalg.slogdet(np.eye(_COEFFICIENTS) + root.T @ root)[1])
+    return float(np.linalg.slogdet(np.eye(len(ACCELEROMETER_TRIAD)) + root.T @ root)[1])
 
 
 def _sphere(y: Array) -> tuple[Array, float]:

@@ -28,6 +28,9 @@ class Limits:
     kept_time: float = 0.7
     """Part of the time at rest that the calmer of two sets of holds with the same poses keeps at least."""
 
+    gap_of_joint: float = 1.0
+    """Time [s] in the place of a step backward, where two logs were joined."""
+
     worse_holds: float = 1.05
     """Standard deviations of the coefficients (geometric mean) by a set of holds, over those by the best, up to which
     a calmer set is taken."""
