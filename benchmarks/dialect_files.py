@@ -17,8 +17,8 @@ from dialects.motion import truth
 from dialects.split import HALVES, half
 
 from inercal.foundation.errors import InercalError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 
 def outcome(dialect, folder, show=False):
@@ -40,7 +40,7 @@ def outcome(dialect, folder, show=False):
             print(text)
         if "[columns" not in "\n".join(line for line in text.splitlines() if not line.startswith("#")):
             return ("nothing", "") if dialect.acc or dialect.gyro else ("right", "")
-        if "QUESTION" in text:
+        if 'grade = "guess"' in text:
             return "asked", ""
         record = read(path, Path(folder) / "map.toml")
     except InercalError as error:

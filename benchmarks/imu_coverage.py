@@ -20,7 +20,7 @@ from inercal.foundation.computing.runs import run
 from inercal.foundation.inference.consistency import coverage
 from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.systems.imu.aided.coefficients import circumstances_of, names_of
-from inercal.systems.imu.ferraris.method import NAMES
+from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
 
 SEED = 20261121
 METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")
@@ -41,8 +41,8 @@ CAMPAIGNS = {
         by_hand.one_calibration_with_g_sensitivity,
         BY_HAND + GYRO_G_SENSITIVITY,
     ),
-    "ferraris": (ferraris.one_calibration, NAMES),
-    "ferraris, by scatter": (ferraris.one_calibration_by_scatter, NAMES),
+    "ferraris": (ferraris.one_calibration, TERMS_OF_FERRARIS),
+    "ferraris, by scatter": (ferraris.one_calibration_by_scatter, TERMS_OF_FERRARIS),
     "aided": (aided.one_calibration, (*names_of(TRIADS, False), *circumstances_of(TRIADS))),
 }
 

@@ -51,10 +51,10 @@ from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, hand_poses
 from inercal.systems.imu.simulate import simulate as simulate_imu
 from inercal.systems.imu.task import calibrate as calibrate_imu
-from inercal.systems.selfcal.before.simulate import experiment
-from inercal.systems.selfcal.before.simulate import simulate as simulate_platform
 from inercal.systems.selfcal.filters.problem import problem as platform_problem
 from inercal.systems.selfcal.filters.run import estimate as estimate_platform
+from inercal.systems.selfcal.simulate import experiment
+from inercal.systems.selfcal.simulate import simulate as simulate_platform
 
 
 @dataclass(frozen=True)

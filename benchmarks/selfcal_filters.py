@@ -19,10 +19,10 @@ from measure import Row, Spread, alone, in_turn, named, row
 
 from inercal.examples import FOLDER
 from inercal.faces.studies.load import load_selfcal_study
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.settings import Filter
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 CHOLESKY, EIGEN = "Cholesky first", "eigen"
 PEERS = {CHOLESKY: plain_filterpy.cholesky_first, EIGEN: plain_filterpy.eigen}

@@ -18,13 +18,13 @@ import numpy as np
 from inercal.examples import FOLDER
 from inercal.faces.studies.load import load_selfcal_study
 from inercal.foundation.geometry.rotations import boxplus
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 SEED = 20261121
 STUDY = load_selfcal_study(FOLDER / "selfcal.toml")

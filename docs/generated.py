@@ -234,7 +234,7 @@ def _plain_type(found: Schema, definitions: Mapping[str, Schema]) -> str:
 
 def _literal(value: object) -> str:
     """A value as TOML writes it."""
-    from inercal.faces.studies.commented import toml
+    from inercal.faces.studies.schema import toml
 
     return code(toml(value))
 
@@ -303,6 +303,15 @@ def reference_types() -> str:
 
 
 # limits ---------------------------------------------------------------------------------------------------------------
+
+
+def section_columns() -> str:
+    """Columns of a ``sections.csv``, by the texts of the fields of a row."""
+    from inercal.systems.imu.sections.cutting import table as of_sections
+
+    meanings = _meanings(inspect.getsource(of_sections), "SectionRow")
+    rows = [(code(name), meanings[name]) for name in of_sections.COLUMNS]
+    return table(("column", "what it says"), rows)
 
 
 def limits() -> str:
@@ -403,6 +412,7 @@ PARTS: dict[str, Callable[..., str]] = {
         noise_terms,
         reference_types,
         limits,
+        section_columns,
         offers,
         public,
         words,

@@ -8,12 +8,12 @@ from absurd.outcome import made
 from absurd.stream import streamed
 from inercal.faces.stream.selfcal import Selfcal
 from inercal.faces.studies.selfcal import selfcal_study
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.find_base import stated_well
 from inercal.systems.selfcal.platform.coefficients import GROUPS
 from inercal.systems.selfcal.result.columns import history_record
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate, compared, load_kernels
 
 #: group -> its usual prior and unit

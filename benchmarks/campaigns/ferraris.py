@@ -11,6 +11,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
+from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
 from inercal.systems.imu.ferraris.simulate import SessionCourse, simulate_session, true_values
 from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
 from inercal.systems.imu.simulate import ImuTruth, TriadNoise, draw_full_truth
@@ -42,8 +43,8 @@ def one_calibration(rng: np.random.Generator) -> dict[str, Array]:
 
     Returns
     -------
-    ``error`` and ``u`` (33,) in the order of `inercal.systems.imu.ferraris.method.NAMES`, their ``dof`` (33,), and
-    ``sound`` (1 if the status was ok).
+    ``error`` and ``u`` (33,) in the order of `inercal.systems.imu.ferraris.names.TERMS_OF_FERRARIS`, their ``dof``
+    (33,), and ``sound`` (1 if the status was ok).
     """
     return _one(rng, ALIGNMENT)
 
@@ -69,9 +70,10 @@ def _one(rng: np.random.Generator, stated: float | None) -> dict[str, Array]:
     estimate = calibrate_ferraris(
         record, ImuSettings(site, time_base_u=TIME_BASE_U, k2_u=0.0), options
     ).estimate
+    at = [estimate.names.index(name) for name in TERMS_OF_FERRARIS]
     return {
-        "error": estimate.values - true_values(truth),
-        "u": estimate.u,
-        "dof": estimate.dof,
+        "error": estimate.values[at] - true_values(truth),
+        "u": estimate.u[at],
+        "dof": estimate.dof[at],
         "sound": np.array(float(estimate.status is Status.OK)),
     }

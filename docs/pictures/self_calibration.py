@@ -7,13 +7,13 @@ import numpy as np
 
 from inercal.foundation.geometry.earth import Site, gravity
 from inercal.foundation.units import parse_unit
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.figures import relative_errors
 from inercal.systems.selfcal.figures.filters import attitude_errors, changes_of_turn
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.plan import path
 from inercal.systems.selfcal.settings import Noise, SelfcalSettings
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 DEG_H, ARCSEC, UG = (parse_unit(unit).factor for unit in ("deg/h", "arcsec", "ug"))
 SIZES = np.repeat([DEG_H, ARCSEC, ARCSEC, ARCSEC, UG, 1e-6, 1e-6, ARCSEC], 3)

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 from sting_study import BASE, DEG, scenario, study
 
 from inercal.systems.aoa.disturbances import Disturbances
 from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.paper.delay import aligned, relative_delay
 from inercal.systems.aoa.reading.recording import plain
 from inercal.systems.aoa.simulate import simulate
@@ -32,6 +34,33 @@ def test_the_delay_is_found_within_its_uncertainty(name):
         us.append(found.u)
     assert np.mean(np.square(errors)) == pytest.approx(1.0, abs=3.0 * math.sqrt(2.0 / 40.0))
     assert max(us) < 5e-5
+
+
+def of_a_sine(frequency, duration, seed):
+    """The delay found in a sine of 10 deg, or 2 deg/s of rate amplitude each hertz."""
+    amplitude = min(10.0, 2.0 / frequency) * DEG
+    motion = MotionPlan(
+        "sine", duration=duration, sample_rate=100.0, mean=5.0 * DEG, amplitude=amplitude, frequency=frequency
+    )
+    settings = study(motion=motion, disturbances=LATE)
+    return relative_delay(recorded(settings, seed), settings.layout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("frequency", "duration"), [(0.05, 300.0), (0.2, 60.0), (1.0, 30.0), (5.0, 20.0), (20.0, 20.0)]
+)
+def test_u_of_the_delay_is_honest_from_slow_to_fast(frequency, duration):
+    """The mean square of error/u over 12 draws is within 99.9 % of chance. Segments shorter than the period made it 12
+    of slow sines, a cubic between samples 25 of fast ones."""
+    found = [of_a_sine(frequency, duration, seed) for seed in range(12)]
+    square = np.mean([((one.value - 2e-3) / one.u) ** 2 for one in found])
+    low, high = chi2.ppf([0.0005, 0.9995], len(found)) / len(found)
+    assert low < square < high
+
+
+def test_a_line_of_which_too_few_periods_were_recorded_tells_no_delay():
+    assert of_a_sine(0.05, 60.0, 1) is None
 
 
 @pytest.mark.parametrize("delay", [-30e-3, -1.3e-3, 0.0, 7.77e-3, 60e-3])

@@ -14,8 +14,7 @@ from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.records.write import write_record
 from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.recording import plain, triggered
-from inercal.systems.aoa.result.balance import clock_offset, join, read_balance
-from inercal.systems.aoa.result.points import points
+from inercal.systems.aoa.result.points import clock_offset, join, points, read_balance
 from inercal.systems.aoa.settings import PointPlan
 from inercal.systems.aoa.simulate import simulate, to_record
 from rows import for_each

@@ -17,6 +17,7 @@ from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
+from inercal.systems.aoa.result import budget
 from inercal.systems.aoa.result.budget import parts
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
 from inercal.systems.aoa.result.systematic import by_fusion, by_methods
@@ -313,3 +314,17 @@ def test_a_zero_lowers_u_of_the_angle():
     assert result.result["angle"]["u"]["median"] < 0.5 * plain.result["angle"]["u"]["median"]
     share = {item.source: item.share.get("theta", 0.0) for item in result.budget}
     assert share["stated zero"] > 0.0
+
+
+def test_parts_of_priors_from_one_run_are_those_of_runs_with_larger_ones(monkeypatch):
+    """P_s = P Pi^-1 Pi_s Pi^-1 P of constants, against q_s dP/dq_s of the filter run again for each."""
+    settings = study(motion=SINE)
+    recording = simulate(settings, np.random.default_rng(3)).recording
+    of, answered = problem(settings), np.ones(len(recording.t), dtype=bool)
+    quick = parts(recording, of, settings, False, answered).budget
+    monkeypatch.setattr(budget, "_of_priors", lambda *_: {})
+    slow = parts(recording, of, settings, False, answered).budget
+    assert [item.source for item in quick] == [item.source for item in slow]
+    for one, other in zip(quick, slow, strict=True):
+        for name in {*one.share, *other.share}:
+            assert one.share.get(name, 0.0) == pytest.approx(other.share.get(name, 0.0), abs=3e-3)

@@ -13,9 +13,9 @@ from inercal.cli import run
 from inercal.foundation.errors import InputError
 from inercal.foundation.records.write import write_record
 from inercal.systems.aoa.motion import MotionPlan
+from inercal.systems.aoa.runs.outcome import error_terms
 from inercal.systems.aoa.runs.run_table import read_runs_table
 from inercal.systems.aoa.runs.series import WindOff, interpolated
-from inercal.systems.aoa.runs.summary import error_terms
 from inercal.systems.aoa.simulate import drawn_biases, simulate, to_record
 from rows import for_each
 

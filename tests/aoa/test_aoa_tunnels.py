@@ -20,7 +20,7 @@ from inercal.systems.aoa.diagnosis.unmodelled import unmodelled
 from inercal.systems.aoa.fusion.filter_result import estimate, of_fusion
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.reading.recording import plain
-from inercal.systems.aoa.result.verification import late_reference
+from inercal.systems.aoa.result.verification import contradicting_reference
 from inercal.systems.aoa.settings import Estimator, Heave, Prior
 
 SEEDS = 2
@@ -231,7 +231,9 @@ def test_a_reference_that_is_late_is_said():
     angles = of_fusion(estimate(recording, problem(study())), 19)
     for late, words in ((3e-3, "3 ms later"), (-3e-3, "3 ms earlier"), (2e-4, "")):
         reference = np.interp(run.t - late, run.t, run.theta)
-        said = [each.message for each in late_reference(replace(recording, reference=reference), angles)]
+        said = [
+            each.message for each in contradicting_reference(replace(recording, reference=reference), angles)
+        ]
         assert ("theta_ref comes " + words in said[0]) if words else said == []
 
 
@@ -390,3 +392,23 @@ def test_a_gyro_as_it_is_usual_keeps_its_prior(kind):
         recording, of = plain(run.t, run.acc, run.gyro), problem(study())
         found = alone(recording, of)
         assert found is None or abs(found.value - run.errors["k_g"]) < 3.5 * found.u
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x: x, ""),
+        (lambda x: -x, "the other sign"),
+        (lambda x: x + 0.5 * DEG, "deg off the angle"),
+        (lambda x: x / DEG, "57.3 times the angle, as if degrees"),
+        (lambda x: 1.02 * x, "1.02"),
+        (lambda x: x + 2.0 * DEG * np.sin(np.arange(len(x)) ** 1.5), "differs from the angle by"),
+    ],
+)
+def test_a_reference_is_judged_like_a_reading(change, words):
+    """Sign, zero, unit and scale of theta_ref are named, and noise far above the u of the angle is no agreement."""
+    recording, run = recorded("quiet", 0, duration=12.0)
+    angles = of_fusion(estimate(recording, problem(study())), 19)
+    said = contradicting_reference(replace(recording, reference=change(run.theta)), angles)
+    assert [one.harm for one in said] == ([("theta",)] if words else [])
+    assert all(words in one.headline for one in said), said

@@ -211,7 +211,7 @@ def test_new_names_the_files_it_wrote_and_asks_for_the_rate(folder, capsys):
     assert next_line in Path("my.toml").read_text("utf-8")
     capsys.readouterr()
     command = ["calibrate", "imu", "raw.csv", "--map", "my-map.toml", "--study", "my.toml"]
-    refused(command, capsys, "my-map.toml: time.rate", "PUT THE SAMPLE RATE HERE")
+    refused(command, capsys, "raw.csv: found no time column t", '--answer "rate=100 Hz"')
 
 
 def test_new_says_that_no_sensor_was_recognised(folder, capsys):

@@ -43,7 +43,7 @@ READ_A_STUDY = {
         "batch",
         "live",
     ),
-    *("design tolerances", "design selfcal", "design strapdown", "design aoa"),
+    *("design tolerances", "design selfcal", "design strapdown", "design aoa", "design sections"),
     *("simulate imu", "simulate strapdown", "simulate turntable", "simulate selfcal", "simulate aoa"),
 }
 WITHOUT_A_FILE = {"monitor", "live", "keep", "instruments", "results", "supersede", "rerun", "workbench"} | {
@@ -137,7 +137,7 @@ def test_every_help_has_one_shape(helps):
         assert used.startswith(f"Usage: inercal {command} ")
         arguments = re.findall(r"^ {2}([A-Z]+): (.*)$", text, re.MULTILINE)
         named = [name if words.endswith("[required]") else f"[{name}]" for name, words in arguments]
-        needs = "--study" in options(text) and command != "live"  # or a calibration, by --apply
+        needs = "--study" in options(text) and command not in ("live", "calibrate imu")  # may do without
         needed = ["--study", "PATH"] if needs else []
         needed = ["--reason", "STR"] if "--reason" in options(text) else needed
         assert used.split()[2 + len(command.split()) :] == [*named, *needed, "[OPTIONS]"]

@@ -14,10 +14,10 @@ from inercal.cli import run
 from inercal.examples import FOLDER
 from inercal.faces.studies.load import load_selfcal_study
 from inercal.foundation.records.read import read
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from inercal.systems.selfcal.platform.plan import path
 from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 SHORT = [
     "--set", 'plan.turns=[["z", "30 deg"], ["x", "20 deg", "2 deg/s"], ["rest", "4 s"]]',

@@ -21,8 +21,8 @@ from inercal.foundation.records.record import Record
 from inercal.foundation.records.write import write_record
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.platform.coefficients import names, to_linear, units
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 QUIET = replace(NOISE["low"], angle_random_walk=0.0, accelerometer=0.0, encoder=0.0)
 #: also gyro scale errors of 30, -20, 50 ppm
@@ -158,7 +158,7 @@ def test_what_is_not_applied_is_said():
 def folder(tmp_path, monkeypatch):
     """A calibration and a record of the paper's path with missing values, here."""
     from inercal.foundation.results.files import save
-    from inercal.systems.selfcal.before.simulate import to_record
+    from inercal.systems.selfcal.simulate import to_record
 
     monkeypatch.chdir(tmp_path)
     save(estimate(TRUTH[:18]), tmp_path / "cal.json")

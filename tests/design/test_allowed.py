@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from positions import drift, efficiency, gravity
 
-from inercal.foundation.designs.criteria import D, insensitive, within
+from inercal.foundation.designs.criteria import D, insensitive
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.errors import InputError
-from inercal.foundation.rigs.plans import grid
+from inercal.foundation.rigs.plans import grid, within
 
 
 def test_whole_turns_do_not_matter():

@@ -19,10 +19,11 @@ NO_CLAIMS = {"Try it", "Goals and non-goals"}
 SILENT = (
     "New here:",
     "For inertial-test engineers",
-    "Hold the IMU still",
+    "Lay the IMU on each",
     "Then",
+    "Or, to look over",
+    "says what it took for what",
     "And around it:",
-    "Six positions and three turns, on a table",
     "Tutorials:",
     "How to:",
     "Design notes:",

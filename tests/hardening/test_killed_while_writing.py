@@ -67,6 +67,7 @@ COMMANDS = {
     "design selfcal": f"design selfcal selfcal.toml {SMALL} --out NEW.json",
     "design strapdown": "design strapdown strapdown.toml --out NEW.json",
     "design aoa": "design aoa aoa.toml --set motion.duration='4 s' --out NEW.json",
+    "design sections": "design sections sections.csv --out NEW.json",
     "design tolerances": "design tolerances turntable.toml --set goal.DX_F='10 deg/h' --out NEW.json",
     "simulate imu": "simulate imu imu.toml --set site.latitude='39.1 deg' --out NEW.csv",
     "simulate strapdown": "simulate strapdown strapdown.toml --out NEW.csv",
@@ -107,6 +108,9 @@ def folder(tmp_path_factory) -> Path:
     )
     write_record(record, path / "log.csv")
     (path / "imu.toml").write_text('[site]\ngravity = "9.81(1) m/s^2"\n[imu]\nstatic_start = "10 s"\n')
+    (path / "sections.csv").write_text(
+        "section,up\n" + "".join(f"{s}{a},{s}{a}\n" for a in "xyz" for s in "+-")
+    )
     for kind in ("strapdown", "turntable", "selfcal", "aoa"):
         assert run(["new", kind, "--out", str(path / f"{kind}.toml"), "--quiet", *FILL]) == 0
     smaller = {

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 
 from inercal.foundation.errors import InputError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import child, limits, read
 from inercal.foundation.records.read.child import in_child
+from inercal.foundation.records.recognise.map_text import guess_map
 from rows import for_each
 
 T = np.arange(300) / 100

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaigns.aided import LATITUDE, PROGRAM, draw_truth, one_calibration
+from new_studies import table_read
 
 from inercal.faces.report.html import render
-from inercal.faces.studies.imu import AidedTable, aided_settings
-from inercal.foundation._toml import check
+from inercal.faces.studies.imu import aided_settings
 from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
@@ -27,7 +27,7 @@ from inercal.systems.imu.aided.calibration import calibrate_aided
 from inercal.systems.imu.aided.figures import pictures
 from inercal.systems.imu.aided.simulate import simulate
 from inercal.systems.imu.aided.walk import whiten
-from inercal.systems.imu.settings import AidedSettings, ImuSettings, mounting_of, mountings
+from inercal.systems.imu.settings import AidedRig, AidedSettings, ImuSettings, mounting_of, mountings
 
 CHAIN = turntable("two_axis_turntable", None)
 SEED = 20261121
@@ -368,18 +368,17 @@ def test_the_temperature_is_that_stated_or_else_that_recorded(noisy):
 
 
 def test_the_study_says_how_the_instrument_sits():
-    table = check(AidedTable, {"mounting": ["+y", "+x", "-z"]}, "study", StudyError)
-    options = aided_settings(table, "study")
+    options = aided_settings(table_read(AidedRig, {"mounting": ["+y", "+x", "-z"]}), "study")
     assert options.azimuth_u is None
     assert options.chain.attitude([0.0, 0.0]) == pytest.approx(mounting_of(("+y", "+x", "-z")))
     rig = {"kind": "two_axis_turntable", "base": {"azimuth": "90.0(1) deg"}}
-    told = aided_settings(check(AidedTable, {"rig": rig}, "study", StudyError), "study")
+    told = aided_settings(table_read(AidedRig, {"rig": rig}), "study")
     assert told.azimuth_u == pytest.approx(np.radians(0.1))
     other = {"kind": "three_axis_turntable", "errors": {"deps_x": {"normal": "3 arcsec"}}}
     with pytest.raises(StudyError, match=r"imu\.aided\.rig\.errors\.deps_x: .* did you mean deps_x1"):
-        aided_settings(check(AidedTable, {"rig": other}, "study", StudyError), "study")
+        aided_settings(table_read(AidedRig, {"rig": other}), "study")
     with pytest.raises(StudyError, match="right-handed"):
-        check(AidedTable, {"mounting": ["+x", "+y", "-z"]}, "study", StudyError)
+        table_read(AidedRig, {"mounting": ["+x", "+y", "-z"]})
 
 
 @pytest.mark.slow

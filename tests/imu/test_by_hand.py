@@ -118,13 +118,19 @@ def test_a_wrong_map_of_the_gyro_is_named(change, code, words, unit):
     assert not any(name.startswith(("S_", "T_")) for name in estimate.names)
 
 
-@for_each("unit, part, named", [(("m/s^2", "deg/s"), 1.0, "S_x"), (("m/s^2", "rad/s"), 1 / GRAVITY, "K1_x")])
-def test_a_wrong_unit_is_no_sound_calibration(unit, part, named):
+@for_each(
+    "unit, part, code, named",
+    [
+        (("m/s^2", "deg/s"), 1.0, "unit_suspect", "S_x"),
+        (("m/s^2", "rad/s"), 1 / GRAVITY, "implausible", "K1_x"),
+    ],
+)
+def test_a_wrong_unit_is_no_sound_calibration(unit, part, code, named):
     """Rates in rad/s said to be in deg/s; specific force in g said to be in m/s^2."""
     record = turned_by_hand(np.random.default_rng(4606), 16)
     estimate = calibrate(record_of(record.t, record.acc * part, record.gyro, *unit), SETTINGS).estimate
     assert estimate.status is not Status.OK
-    (finding,) = (one for one in estimate.findings if one.code == "unit_suspect")
+    (finding,) = (one for one in estimate.findings if one.code == code)
     assert named in finding.harm
 
 
@@ -269,9 +275,12 @@ def variants(t, acc, gyro):
     yield "last tenth cut", t[: -n // 10], acc[: -n // 10], gyro[: -n // 10], 0.9, 1.0
 
 
-def most_growth(what):
-    """Growth of u at most, beyond that by the number of samples: where poses, or all moves, are lost, 3."""
-    return 3.0 if "cut" in what or what == "no gyro" else 1.3
+def most_growth(what, head):
+    """Growth of u at most, beyond that by the number of samples: where poses, or all moves, are lost, 3; of biases of
+    the gyro, whose noise may be told by 8 degrees of freedom, so that u scatters by 1/sqrt(16), 1.3 (1 + 2/sqrt(16))."""
+    if "cut" in what or what == "no gyro":
+        return 3.0
+    return 1.95 if head == "D_F" else 1.3
 
 
 @pytest.mark.slow
@@ -294,6 +303,6 @@ def test_values_stay_whatever_is_done_to_a_recording(name):
             u = max(here.u, there.u / np.sqrt(share)) if share < 1.0 else here.u
             allowed = 3.0 * np.sqrt(abs(u**2 - there.u**2)) + 0.3 * there.u
             moved, grown = abs(value - there.value) / allowed, here.u / there.u * np.sqrt(share)
-            if moved > 1.0 or grown > most_growth(what):
+            if moved > 1.0 or grown > most_growth(what, head):
                 wrong.append((what, here.name, round(moved, 2), round(grown, 2)))
     assert wrong == []

@@ -23,14 +23,12 @@ from ferraris_sessions import (
     with_values,
 )
 
-from inercal.foundation.errors import InputError, RecordError, StudyError
+from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.records.record import Record
-from inercal.foundation.units import parse_unit
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
-from inercal.systems.imu.ferraris.detection import detect
-from inercal.systems.imu.ferraris.gravity_transfer import carry
 from inercal.systems.imu.ferraris.names import NAMES, POSITIONS
+from inercal.systems.imu.ferraris.nine import nine_sections
 from inercal.systems.imu.settings import FerrarisSettings
 
 OPTIONS = FerrarisSettings()
@@ -57,7 +55,8 @@ def codes(found):
 def test_labels_may_be_written_as_signed_axes_and_in_capitals(whole):
     plain = calibrate_ferraris(whole, SETTINGS, OPTIONS)
     other = relabelled(whole, x_p="+X", x_a="-x", y_p=" Y_P ", z_rot="Z_ROT")
-    assert np.array_equal(calibrate_ferraris(other, SETTINGS, OPTIONS).estimate.values, plain.estimate.values)
+    same = calibrate_ferraris(other, SETTINGS, OPTIONS).estimate
+    np.testing.assert_allclose(same.values, plain.estimate.values, rtol=1e-9)
     assert plain.estimate.result["found_by"] == "labels"
 
 
@@ -69,18 +68,25 @@ def test_sections_named_in_samples_or_in_time_are_those_labelled(whole, in_time)
         ends = {name: (start / 50.0, stop / 50.0 - 0.01) for name, (start, stop) in ends.items()}
     named = calibrate_ferraris(unlabelled(whole), SETTINGS, FerrarisSettings(sections=ends))
     assert named.estimate.result["found_by"] == "study"
-    assert np.array_equal(named.estimate.values, calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate.values)
+    labelled = calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate
+    np.testing.assert_allclose(named.estimate.values, labelled.values, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_detected_sections_give_the_values_of_the_named_ones(name):
-    """The margins of a hold are a matter of taste: values move by less than half their standard uncertainty."""
+    """The margins of a hold, and whether a nudge after a turn belongs to it, are a matter of taste: values move by less
+    than their standard uncertainty, or by what a doubt about a turn says."""
     record = record_of(name)
     named = calibrate_ferraris(record, UNSURE, options_of(name)).estimate
     found = calibrate_ferraris(unlabelled(record), UNSURE, options_of(name, sections=None)).estimate
     assert found.result["found_by"] == "detection"
     assert found.status is Status.OK
-    assert np.max(np.abs(found.values - named.values) / named.u) < 0.5
+    doubtful = (
+        name == "ferraris"
+    )  # the turn about y has a nudge back, and nothing recorded between the sides tells
+    assert doubtful == any(f.headline.startswith("Which motion is the turn about y") for f in found.findings)
+    off = np.abs(found.values - named.values) / found.u
+    assert np.max(off) < (1.5 if doubtful else 0.75)
 
 
 @pytest.mark.parametrize("seed", [22, 23, 24])
@@ -88,9 +94,10 @@ def test_detection_finds_the_positions_and_turns_of_a_session(seed):
     record, _ = session(seed, noisy=True, alignment=math.radians(1.0), turn=-2.0 * math.pi)
     found = calibrate_ferraris(unlabelled(record), SETTINGS, FerrarisSettings(turn=-2.0 * math.pi))
     labels = np.array(record.labels)
+    spans = nine_sections(unlabelled(record), "log.csv", FerrarisSettings(turn=-2.0 * math.pi)).spans
     for name in NAMES:
         own = np.flatnonzero(labels == name)
-        rows = found.sections.acc[name]
+        (rows,) = spans[name]
         if name in POSITIONS:
             assert set(rows.tolist()) <= set(own.tolist())
             assert len(rows) > 0.6 * len(own)
@@ -116,10 +123,10 @@ def test_a_gyro_with_its_own_clock(whole):
         if name.startswith("S_"):
             assert b[name].value == pytest.approx(a[name].value, rel=2e-3)
     detected = calibrate_ferraris(unlabelled(slow), SETTINGS, OPTIONS)
-    assert detected.sections.missing == ()
+    assert len(detected.sections) == 9
 
 
-def test_a_gyro_that_was_not_on_in_a_section_is_an_error(whole):
+def test_a_gyro_that_was_not_on_in_a_section_is_named(whole):
     """Labels are those of the accelerometers: they say nothing of when a gyro on another clock was read."""
     last = np.flatnonzero(np.array(whole.labels) == "y_rot")[0]
     t = whole["gyro_x"].t[:last].copy()
@@ -128,8 +135,9 @@ def test_a_gyro_that_was_not_on_in_a_section_is_an_error(whole):
         for name, column in whole.columns.items()
     }
     short = Record(columns, (), whole.sources, whole.labels)
-    with pytest.raises(RecordError, match="section y_rot has 0 rows of gyro with numbers"):
-        calibrate_ferraris(short, SETTINGS, OPTIONS)
+    found = calibrate_ferraris(short, SETTINGS, OPTIONS).estimate
+    assert found.status is Status.INCONSISTENT
+    assert found.message.startswith("y_rot is not used: lasts 0.0 s")
 
 
 def test_a_turn_in_which_the_gyro_rests_is_named(whole):
@@ -141,7 +149,7 @@ def test_a_turn_in_which_the_gyro_rests_is_named(whole):
     labels[np.flatnonzero(np.array(record.labels) == "x_rot")[0] - 60 :][:50] = "x_rot"
     found = calibrate_ferraris(replace(record, labels=tuple(labels.tolist())), SETTINGS, OPTIONS)
     assert found.estimate.status is Status.INCONSISTENT
-    assert found.estimate.message == "the turn x_rot shows hardly on any axis of gyro: check the sections"
+    assert found.estimate.message.startswith("x_rot is not used: nothing turns in it.")
 
 
 # What is missing.
@@ -160,7 +168,6 @@ def test_a_missing_section_is_named(whole, name, way):
     labels = tuple(np.array(whole.labels)[rows].tolist()) if way == "labels" else ()
     found = calibrate_ferraris(Record(columns, (), whole.sources, labels), SETTINGS, OPTIONS)
     assert found.estimate.status is Status.TOO_FEW_INTERVALS
-    assert found.sections.missing == (name,)
     assert f"found 8 of the nine sections, not {name} (" in found.estimate.message
     assert found.estimate.names == ()
 
@@ -196,22 +203,22 @@ def test_a_turn_labelled_twice_and_a_dead_sensor_are_errors(whole):
 def test_exchanged_channels_are_named(whole):
     swapped = calibrate_ferraris(renamed(whole, gyro_x="gyro_y", gyro_y="gyro_x"), SETTINGS, OPTIONS)
     assert swapped.estimate.status is Status.INCONSISTENT
-    assert "the turn x_rot shows on gyro_y" in swapped.estimate.message
+    assert "x_rot turns about y, not about x" in swapped.estimate.message
     swapped = calibrate_ferraris(renamed(whole, acc_z="acc_y", acc_y="acc_z"), SETTINGS, OPTIONS)
     assert "channel_swap" in codes(swapped)
-    assert "the positions y_p and y_a show on acc_z" in swapped.estimate.message
+    assert "y_p stands on +z, not on +y" in swapped.estimate.message
 
 
 def test_positions_exchanged_with_their_opposites_are_named(whole):
     found = calibrate_ferraris(relabelled(whole, x_p="x_a", x_a="x_p"), SETTINGS, OPTIONS)
     assert found.estimate.status is Status.INCONSISTENT
-    assert "acc_x reads downward in x_p" in found.estimate.message
+    assert "stands on +x, not on -x" in found.estimate.message
 
 
 def test_one_gyro_axis_that_runs_against_the_others_is_named(whole):
     found = calibrate_ferraris(with_values(whole, gyro_z=np.negative), SETTINGS, OPTIONS)
     assert found.estimate.status is Status.INCONSISTENT
-    assert "gyro_z runs against the other two" in found.estimate.message
+    assert "z_rot turns the other way than its angle says, about z" in found.estimate.message
 
 
 def test_the_ways_between_the_positions_tell_turns_made_backward_from_a_reversed_gyro(whole):
@@ -219,7 +226,7 @@ def test_the_ways_between_the_positions_tell_turns_made_backward_from_a_reversed
     reverse = FerrarisSettings(turn=-2.0 * math.pi)
     backward = calibrate_ferraris(whole, SETTINGS, reverse)
     assert backward.estimate.status is Status.INCONSISTENT
-    assert 'state imu.ferraris.turn = "360 deg"' in backward.estimate.message
+    assert 'State imu.ferraris.turn = "360 deg"' in backward.estimate.message
     flipped = with_values(whole, **{f"gyro_{i}": np.negative for i in "xyz"})
     gyro = calibrate_ferraris(flipped, SETTINGS, OPTIONS)
     assert gyro.estimate.status is Status.OK
@@ -232,7 +239,8 @@ def test_the_ways_between_the_positions_tell_turns_made_backward_from_a_reversed
     labels = tuple(np.array(whole.labels)[cut].tolist())
     silent = calibrate_ferraris(Record(columns, (), whole.sources, labels), SETTINGS, reverse)
     assert silent.estimate.status is Status.OK
-    assert any("lacks the motion between the positions" in f.message for f in silent.estimate.findings)
+    said = " ".join(f.message for f in silent.estimate.findings)
+    assert "the motion between the rests, which would tell, is not there" in said
 
 
 def test_the_shipped_sessions_say_how_they_were_turned():
@@ -268,13 +276,17 @@ def test_a_motion_in_a_position_a_gap_and_saturation_in_a_turn_spoil_them(whole)
     turned = whole["gyro_x"].values[x_rot]
     top = float(turned[80] + 0.8 * (turned[81] - turned[80]))  # the sample before is well below it
     for changes, words in (
-        ({"acc_x": shaken}, "the instrument moves in section x_p"),
-        ({"gyro_x": lost}, "samples are missing in the turn x_rot"),
-        ({"gyro_x": lambda v: np.minimum(v, top)}, "the gyro saturates in the turn x_rot"),
+        ({"acc_x": shaken}, "The instrument moves in x_p"),
+        ({"gyro_x": lost}, "x_rot is not used: samples are missing within the turn"),
+        (
+            {"gyro_x": lambda v: np.minimum(v, top)},
+            "samples of the gyro in the turn are at the end of its range",
+        ),
     ):
         found = calibrate_ferraris(with_values(whole, **changes), SETTINGS, OPTIONS)
         assert found.estimate.status is Status.INCONSISTENT
         assert words in found.estimate.message
+        assert found.estimate.names == ()
 
 
 def test_a_turn_that_is_cut_off_is_said_to_be(whole):
@@ -286,7 +298,7 @@ def test_a_turn_that_is_cut_off_is_said_to_be(whole):
         found = calibrate_ferraris(replace(whole, labels=tuple(short)), SETTINGS, OPTIONS)
         said = [f.message for f in found.estimate.findings if f.code in ("turn_cut", "poor_section")]
         assert len(said) == 1
-        assert "z_rot is under way at the end of its section" in said[0]
+        assert "under way at its end" in said[0]
         assert found.estimate.status is status
 
 
@@ -296,8 +308,8 @@ def test_sections_that_do_not_differ_are_named():
     rows = {name: np.flatnonzero(np.array(record.labels) == name) for name in NAMES}
     ends = {name: (int(each[0]), int(each[-1]) + 1) for name, each in rows.items()}
     for name, other, words in (
-        ("x_a", "x_p", "the positions x_p and x_a show hardly on any axis of acc"),
-        ("y_rot", "y_p", "the turn y_rot shows hardly on any axis of gyro"),
+        ("x_a", "x_p", "x_p and x_a hold the same side"),
+        ("y_rot", "y_p", "y_rot"),
     ):
         found = calibrate_ferraris(record, SETTINGS, FerrarisSettings(sections=ends | {name: ends[other]}))
         assert found.estimate.status is Status.INCONSISTENT
@@ -307,31 +319,12 @@ def test_sections_that_do_not_differ_are_named():
 
 def test_a_turn_with_a_pause_for_a_new_grip_is_one_turn():
     """Two halves with rest between them: their sum is the stated angle, of physical outputs."""
-    halves, truth = session(26, noisy=True, turn=math.pi)
-    labels = np.array(halves.labels)
-    twice = []
-    for name in ("x_rot", "y_rot", "z_rot"):
-        rows = np.flatnonzero(labels == name)
-        around = np.arange(rows[0] - 100, rows[-1] + 101)  # with the rests before and after it
-        twice += [around, around]
-    first = np.flatnonzero(labels == "x_rot")[0] - 100
-    order = np.concatenate([np.arange(first), *twice])
-    t = np.arange(len(order)) / 50.0
-    unit = parse_unit("deg/s")
-    scale = math.degrees(1.0) / 4775.0
-    columns = {
-        name: replace(
-            column,
-            t=t,
-            values=column.values[order] * (scale if name.startswith("gyro") else 1.0),
-            unit=unit if name.startswith("gyro") else column.unit,
-        )
-        for name, column in halves.columns.items()
-    }
-    found = calibrate_ferraris(Record(columns, (), halves.sources), SETTINGS, OPTIONS)
-    assert found.sections.missing == ()
+    halves, truth = session(26, noisy=True, turn=math.pi, headings=(math.pi, 0.0), pause=1.0)
+    record, factor = in_degrees(halves)
+    found = calibrate_ferraris(unlabelled(record), SETTINGS, OPTIONS).estimate
+    assert found.status is Status.OK
     for i, axis in enumerate("xyz"):
-        assert found.estimate[f"S_{axis}"].value == pytest.approx(truth.gyro.scale[i] * scale, rel=1e-3)
+        assert found[f"S_{axis}"].value == pytest.approx(truth.gyro.scale[i] * factor, rel=1e-3)
 
 
 def test_rows_without_a_time_stamp_do_not_count():
@@ -343,7 +336,6 @@ def test_rows_without_a_time_stamp_do_not_count():
         calibrate_ferraris(each, SETTINGS, OPTIONS)
         for each in (record, Record(columns, (), record.sources, record.labels))
     )
-    assert len(b.sections.acc["x_p"]) == len(a.sections.acc["x_p"]) - 3
     assert b.estimate.status is Status.OK
     assert abs(a.estimate["K1_x"].value - b.estimate["K1_x"].value) < a.estimate["K1_x"].u
 
@@ -385,7 +377,7 @@ def test_changes_of_heading_before_and_after_a_turn_are_not_taken_for_part_of_it
             right += bool(np.all(np.abs(off) < 4e-3))
         else:
             assert any(f.code in ("turn_doubtful", "contradiction") for f in found.findings)
-            assert "label it, or state it under imu.ferraris.sections" in found.message
+            assert "Label it, or state it under imu.ferraris.sections" in found.message
     assert right >= 0.9 * runs
 
 
@@ -412,7 +404,7 @@ def test_a_turn_by_another_angle_than_stated_is_named():
     record, truth = session(65, noisy=True, turn=math.radians(370.0))
     found = calibrate_ferraris(unlabelled(record), SETTINGS, OPTIONS).estimate
     assert found.status is Status.INCONSISTENT
-    assert re.search(r"the turn x_rot found was by 3(69|70)\.\d deg, not by 360 deg", found.message)
+    assert re.search(r"the turn about x was by 3(69|70)\.\d deg, not 360 deg", found.message)
     believed = calibrate_ferraris(
         unlabelled(record), SETTINGS, FerrarisSettings(turn_u=math.radians(10.0))
     ).estimate
@@ -439,20 +431,6 @@ def test_without_the_ways_the_choice_of_the_turns_is_said_to_be_unchecked(whole,
     assert any("is taken for granted" in f.message for f in cut.findings)
     plain = calibrate_ferraris(record, SETTINGS, OPTIONS).estimate
     assert cut["S_x"].value == pytest.approx(plain["S_x"].value, rel=1e-3)
-
-
-def test_gravity_carried_between_the_rests_gives_the_scale_factors_within_its_uncertainty():
-    """The check has a second source: it knows nothing of the turns' angle."""
-    z = []
-    for seed in range(70, 78):
-        record, truth = session(seed, noisy=True, alignment=math.radians(0.5), turn=math.radians(200.0))
-        acc, gyro = record.triad("acc"), replace(record.triad("gyro"), t=record["acc_x"].t)
-        acc = replace(acc, t=gyro.t)
-        known = carry(acc, gyro, detect(acc, gyro))
-        assert np.all(known.u < 0.02)
-        z += ((known.scale / truth.gyro.scale - 1.0) / known.u).tolist()
-    assert np.max(np.abs(z)) < 4.0
-    assert 0.2 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
 def test_a_turn_that_the_record_cuts_short_is_named(whole):
@@ -488,17 +466,43 @@ def test_labels_of_ones_own_are_stated_in_the_study():
     own = relabelled(whole, **GERMAN)
     a = calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate
     b = calibrate_ferraris(own, SETTINGS, replace(OPTIONS, sections=GERMAN)).estimate
-    np.testing.assert_array_equal(a.values, b.values)
+    np.testing.assert_allclose(a.values, b.values, rtol=1e-9)
     with pytest.raises(
         StudyError, match=r"sections.x_p: found no row labelled 'X up', the record has Drehung X, "
     ):
         calibrate_ferraris(own, SETTINGS, replace(OPTIONS, sections=GERMAN | {"x_p": "X up"}))
 
 
+def test_labels_that_are_words_of_sides_and_turns_need_no_study():
+    whole = record_of("ferraris")
+    a, b = (
+        calibrate_ferraris(each, SETTINGS, OPTIONS).estimate for each in (whole, relabelled(whole, **GERMAN))
+    )
+    assert b.result["found_by"] == "labels"
+    np.testing.assert_allclose(a.values, b.values, rtol=1e-9)
+
+
 def test_labels_that_name_no_section_are_not_passed_over_in_silence():
-    own = relabelled(record_of("ferraris"), **GERMAN)
-    found = calibrate_ferraris(own, SETTINGS, OPTIONS).estimate.findings
+    numbers = {name: f"part {k}" for k, name in enumerate(NAMES)}
+    found = calibrate_ferraris(
+        relabelled(record_of("ferraris"), **numbers), SETTINGS, OPTIONS
+    ).estimate.findings
     (said,) = (f.message for f in found if f.code == "unused_labels")
-    assert said.startswith("the labels Drehung X, Drehung Y, Drehung Z, X oben, X unten and 4 more name none")
-    typo = calibrate_ferraris(relabelled(record_of("ferraris"), x_p="xp"), SETTINGS, OPTIONS).estimate
-    assert typo.message.endswith("label it in the recording (found the labels xp)")
+    assert said.startswith(
+        "The labels part 0, part 1, part 2, part 3, part 4 and 4 more name no side or turn"
+    )
+    typo = calibrate_ferraris(relabelled(record_of("ferraris"), x_p="xq"), SETTINGS, OPTIONS).estimate
+    assert typo.status is Status.TOO_FEW_INTERVALS
+    assert typo.message.endswith("(found the labels xq)")
+
+
+def test_a_clock_that_was_set_back_between_sections_changes_nothing(whole):
+    """Each section has times of its own from 0: rows are told apart by their labels."""
+    kept = np.isin(whole.labels, NAMES)
+    labels = np.array(whole.labels)[kept]
+    t = np.concatenate([np.arange(np.count_nonzero(labels == name)) / 50.0 for name in NAMES])
+    columns = {name: replace(c, values=c.values[kept], t=t) for name, c in whole.columns.items()}
+    again = calibrate_ferraris(Record(columns, (), whole.sources, tuple(labels.tolist())), SETTINGS, OPTIONS)
+    plain = calibrate_ferraris(whole, SETTINGS, OPTIONS).estimate
+    assert again.estimate.status is Status.OK
+    assert np.max(np.abs(again.estimate.values - plain.values) / plain.u) < 0.1

@@ -6,7 +6,6 @@ from recordings import shipped
 
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.aided.calibration import AidedCalibration
-from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 from inercal.systems.imu.task import calibrate
 
@@ -14,7 +13,7 @@ from inercal.systems.imu.task import calibrate
 def test_the_settings_choose_the_method():
     for name, kind in (
         ("mpu6050", CalibrationFromSections),
-        ("ferraris", FerrarisCalibration),
+        ("ferraris", CalibrationFromSections),
         ("table", AidedCalibration),
     ):
         assert isinstance(calibrate(*shipped(name)), kind)

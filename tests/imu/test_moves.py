@@ -16,7 +16,7 @@ from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import problem_of
 from inercal.systems.imu.sections.start import first_guess
 from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, LOCAL, SWIVEL, TILT
-from inercal.systems.imu.sections.with_moves import calibrate_with_moves, not_whole
+from inercal.systems.imu.sections.with_moves import calibrate_with_moves, not_seen, not_whole, verticals_of
 from rows import for_each
 
 PRIORS = Priors(Site(GRAVITY, (), LATITUDE), mounting_u=2e-3, clock_u=1e-3)
@@ -381,3 +381,37 @@ def test_coverage_of_many_records_in_the_hand(rests):
     inside = np.mean(np.abs(over_U) < 1, axis=0)
     assert 0.94 < inside.mean() < 0.98, inside
     assert inside.min() > 0.89, inside  # of 200: 0.95 less four standard deviations of the binomial
+
+
+def test_a_jump_to_another_side_is_no_move():
+    """Rows between two poses are missing: the vertical turns, the gyro does not."""
+    record = turned_by_hand(np.random.default_rng(3), 12)
+    sections, moves = record.sections(), list(record.moves())
+    short = {name: getattr(moves[4], name)[:3] for name in ("t", "gyro", "acc")}
+    moves[4] = replace(moves[4], **short | {"gyro": np.zeros((3, 3))})
+    alone = calibrate_sections([replace(s, gyro=None, gyro_var=None) for s in sections], PRIORS)
+    for priors in (PRIORS, replace(PRIORS, gyro_scale=None)):
+        out = not_seen(moves, sections, priors, verticals_of(alone))
+        assert [one.move for one in out] == [4]
+
+
+def test_turns_about_the_vertical_alone_give_no_scale_of_counts():
+    """Where no vertical turns, gravity carries nothing: S of a gyro in counts stays open, and no move is used."""
+    record = turned_by_hand(np.random.default_rng(3), 12)
+    sections, moves = record.sections(), record.moves()
+    same = [replace(move, last=move.first) for move in moves]
+    alone = calibrate_sections([replace(s, gyro=None, gyro_var=None) for s in sections], PRIORS)
+    up = verticals_of(alone)
+    assert len(not_seen(same, sections, replace(PRIORS, gyro_scale=None), up)) == len(moves)
+    assert not_seen(same, sections, PRIORS, up) == ()
+
+
+@pytest.mark.parametrize("factor", [np.pi / 180.0, 180.0 / np.pi])
+def test_a_wrong_unit_is_named_and_no_rows_are_missed(factor):
+    """Outputs in rad/s that are said to be in deg/s are small in every move, and the other way round."""
+    record = turned_by_hand(np.random.default_rng(3), 12)
+    sections = [replace(s, gyro=factor * s.gyro) for s in record.sections()]
+    moves = [replace(move, gyro=factor * move.gyro) for move in record.moves()]
+    found = calibrate_with_moves(sections, moves, PRIORS)
+    assert found.left_out == ()
+    assert found.rescaled

@@ -144,3 +144,15 @@ def test_a_rate_about_another_axis_is_named():
     (found,) = said(changed({**six_sides(), **rates()}, "x +0.5", axis=np.eye(3)[1]))
     assert found[0] == "channel_swap"
     assert "turns about x, not about y" in found[1]
+
+
+def test_a_gyro_of_another_range_is_one_question():
+    """All rates at half of what is stated: no rate is wrong."""
+    everything = {**six_sides(), **rates()}
+    halved = {
+        name: dataclasses.replace(one, rate=2.0 * one.rate, angle=2.0 * one.angle)
+        for name, one in everything.items()
+    }
+    (found,) = said(halved, GYRO_GAIN)
+    assert found[0] == "unit_suspect"
+    assert "another range" in found[1]

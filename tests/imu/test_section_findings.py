@@ -33,7 +33,7 @@ def judged(sections, unit, **known):
     before = contradictions(sections, 1.0)
     found = calibrate_sections(sections, Priors(site(unit), **known))
     status, message = verdict(found, before)
-    return status, message, {each.code: each for each in (*before, *findings_of(found))}
+    return status, message, {each.code: each for each in (*before, *findings_of(found, found.problem.priors))}
 
 
 def exchanged(sections, first, second):
@@ -52,7 +52,7 @@ def changed(sections, name, **fields):
 def test_sound_sections_are_ok(sound, unit):
     status, _, findings = judged(sound, unit)
     assert status is Status.OK
-    assert set(findings) <= {"by_prior", "scatter_by_prior", "stated_exact"}
+    assert set(findings) <= {"by_prior", "scatter_by_prior", "stated_exact", "blind"}
     assert {item["term"] for item in findings["by_prior"].items} >= {"K2_x", "K2_y", "K2_z"}
 
 
@@ -108,7 +108,10 @@ def test_a_wrong_unit_of_all_drops_the_prior_of_scale_factors(sound, unit):
     found = calibrate_sections(halved, Priors(site(unit)))
     assert found.freed
     assert found.value("S_x")[0] == pytest.approx(0.5 * unit.truth["S_x"], rel=0.01)
-    assert verdict(found, ())[0] is Status.INCONSISTENT
+    assert verdict(found, ())[0] is Status.OK
+    (finding,) = (each for each in findings_of(found, Priors(site(unit))) if each.code == "unit_suspect")
+    assert "another range" in finding.headline
+    assert finding.harm == ("S_x", "S_y", "S_z")
 
 
 def test_a_rest_that_moved_is_named(unit):
@@ -187,7 +190,7 @@ def test_noise_that_is_stated_too_small_is_a_finding_and_u_allows_for_it(unit):
     found = calibrate_sections(sections, Priors(site(unit)))
     assert found.excess == {"acc"}
     assert found.scatter["acc"] == pytest.approx(3e-4, rel=0.5)
-    assert "excess_scatter" in {each.code for each in findings_of(found)}
+    assert "excess_scatter" in {each.code for each in findings_of(found, found.problem.priors)}
 
 
 def test_sections_of_one_setup_are_not_independent(unit):

@@ -4,14 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ferraris_sessions import options_of, record_of
+from ferraris_sessions import UNSURE, options_of, record_of
 from turned_units import DEG, SIDES, Bench, Unit
 
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
-from inercal.systems.imu.ferraris.method import NAMES as OF_FERRARIS
-from inercal.systems.imu.ferraris.method import Inputs, coefficients
-from inercal.systems.imu.ferraris.names import POSITIONS, TURNS
 from inercal.systems.imu.sections.calibration import calibrate_sections
 from inercal.systems.imu.sections.outputs import misfit, rows
 from inercal.systems.imu.sections.priors import Priors, Size
@@ -19,7 +16,6 @@ from inercal.systems.imu.sections.problem import problem_of
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.solve import solved
 from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.settings import ImuSettings
 
 
 def site_of(unit):
@@ -159,15 +155,15 @@ def test_six_sides_with_placing_nought_are_the_closed_form():
         g_sensitivity=1e3,
     )
     found = calibrate_sections([*parts, *turns], known)
-    force, rate = (np.array([getattr(s, name) for s in parts]) for name in ("acc", "gyro"))
-    up = np.array([s.up for s in turns])
-    gain, bias = np.eye(3), np.zeros(3)
-    closed = coefficients(
-        Inputs(force, rate, bias + unit.gravity * up @ gain, np.array([s.gyro for s in turns]), np.full(3, 6.0),
-               np.full(3, 2 * np.pi), np.array(unit.gravity), np.array(0.0)),
-        np.full(6, 1 / 6),
-    )  # fmt: skip
-    x = dict(zip(OF_FERRARIS, closed, strict=True))
+    force = np.array([s.acc for s in parts])
+    gain = (force[0::2] - force[1::2]).T / (2.0 * unit.gravity)
+    x = {f"K1_{a}": gain[k, k] for k, a in enumerate("xyz")}
+    x |= {
+        f"M_{a}{b}": gain[k, m] / gain[k, k]
+        for k, a in enumerate("xyz")
+        for m, b in enumerate("xyz")
+        if k != m
+    }
     for name, u in zip(found.names, found.u, strict=True):
         if name.startswith(("K1", "M")):
             assert found.value(name)[0] == pytest.approx(x[name], abs=1e-3 * u + 1e-12), name
@@ -193,25 +189,11 @@ def test_means_of_six_sides_give_half_differences():
         assert 2e-4 < u < 2.5e-3
 
 
-def test_a_shipped_session_gives_what_ferraris_gives():
-    """Sides and turns read by today's method, placing and noise told by their own scatter."""
-    record, options = record_of("ferraris-si"), options_of("ferraris-si")
-    site = Site(9.81, (GravityInput("site", 2e-3, "m/s^2", 1.0),))
-    today = calibrate_ferraris(record, ImuSettings(site), options)
-    i, readings = today.readings.inputs, today.readings
-    sections = [
-        Section("rest", name=name, acc=i.force[k], gyro=i.rate[k], up=SIDES[("+" if name[2] == "p" else "-") + name[0]])
-        for k, name in enumerate(POSITIONS)
-    ] + [
-        Section("turn", name=name, gyro=i.turned_rate[k], axis=np.eye(3)[k], up=np.eye(3)[k], angle=float(i.angles[k]),
-                angle_u=2 * DEG, duration=float(i.durations[k]), cosine_sine=tuple(readings.swing[k]))
-        for k, name in enumerate(TURNS)
-    ]  # fmt: skip
-    scale = Size(1.0 / today.gyro.unit.factor, 0.05)
-    found = calibrate_sections(sections, Priors(site, gyro_scale=scale))
-    for name in today.estimate.names:
-        mine, u, _ = found.value(name)
-        other = today.estimate[name]
-        assert abs(mine - other.value) < 0.6 * max(u, other.u), name
-        if name.startswith(("S", "M", "T")):
-            assert 0.75 < u / other.u < 1.1, name
+@pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])
+def test_a_shipped_session_gives_what_its_authors_found(name):
+    """imucal's numbers from the same sections, within half of u but for D_F: imucal's is the mean of all samples, so
+    that unequal holds leave some of G in it."""
+    found = calibrate_ferraris(record_of(name), UNSURE, options_of(name)).estimate
+    for term, other in found.result["imucal"].items():
+        most = 0.6 if term.startswith("D_F") else 0.5
+        assert abs(found[term].value - other) < most * found[term].u, term

@@ -46,23 +46,25 @@ def test_uncertainties_of_k2_are_true_in_100_runs():
 
 
 def test_k2_of_a_good_unit_is_found():
-    """K2 of 30 ug/g^2, ten times its u: neither a bias nor a scale factor is off by it."""
-    found, error = calibrated(1, ups=imu.square_ups, poses=19, k2=3e-6, **NAVIGATION)
-    assert found.estimate.status in (Status.OK, Status.SUSPECT)
-    assert np.max(np.abs(error[:9])) < 5.0
-    _, error = calibrated(
-        1, settings=replace(SETTINGS, k2_u=0.0), ups=imu.square_ups, poses=19, k2=3e-6, **NAVIGATION
-    )
-    assert np.max(np.abs(error[:3])) > 4.0
+    """K2 of 30 ug/g^2, ten times its u: neither a bias nor a scale factor is off by it, which biases are without, nor
+    by the level part of earth rate, which a gyro of 1e-6 rad/s/sqrt(Hz) sees in all poses alike. (At 50 Hz the integral
+    of samples is 2 ppm off, 5 u.)"""
+    found, error = calibrated(1, ups=imu.square_ups, poses=19, k2=3e-6, rate=100.0, **NAVIGATION)
+    assert found.estimate.status is Status.OK
+    assert np.max(np.abs(error)) < 5.0
+    none = replace(SETTINGS, k2_u=0.0)
+    _, error = calibrated(1, settings=none, ups=imu.square_ups, poses=19, k2=3e-6, rate=100.0, **NAVIGATION)
+    assert np.max(np.abs(error[:3])) > 2.0
 
 
 def worst_of_shifts(k2, runs=4):
-    """Largest shift of a coefficient by K2 on all axes over u, rms over the runs that end ok, and their share."""
+    """Largest shift of another coefficient by K2 on all axes over u, rms over the runs that end ok, and their share."""
     shifts = []
     for seed in range(runs):
         sound, off = (calibrated(seed, k2=each)[0].estimate for each in (0.0, k2))
         if off.status is Status.OK:
-            shifts.append(np.max(np.abs(off.values - sound.values) / off.u))
+            others = [name for name in off.names if not name.startswith("K2")]
+            shifts.append(max(abs(off[name].value - sound[name].value) / off[name].u for name in others))
     return float(np.sqrt(np.mean(np.square(shifts)))) if shifts else 0.0, len(shifts) / runs
 
 
@@ -91,7 +93,7 @@ def test_a_study_states_k2(imu, expected):
 @for_each(
     ("imu", "sentence"),
     [
-        ({"k2": "30(5) ug/g^2"}, "expected true or 0 with an uncertainty"),
+        ({"k2": "30(5) ug/g^2"}, "expected true, false or 0 with an uncertainty"),
         ({"k2": "0(50) m"}, "imu.k2"),
         ({"k2": True, "method": "ferraris"}, "do not tell K2 from K0"),
         ({"k2": "0(50) ug/g^2", "method": "aided"}, "expected true or false"),
@@ -103,13 +105,15 @@ def test_k2_that_cannot_be_is_refused(imu, sentence):
     assert sentence in caught.value.message
 
 
-def test_k2_of_six_positions_is_all_in_k0():
-    """Closed form: a reading of 1 g up and one of 1 g down have the mean K0 + K1 K2 g^2."""
+def test_k2_of_six_positions_is_in_k0():
+    """A reading of 1 g up and one of 1 g down have the mean K0 + K1 K2 g^2; the other four sides tell K0 as well, and
+    better where they were square, so that this is the most that K2 can do."""
     record, settings = shipped("ferraris-si")
     size = 1e-5
     exact, stated = (calibrate(record, replace(settings, k2_u=u)).estimate for u in (0.0, size))
     g = settings.site.gravity
     for axis in "xyz":
         more = np.sqrt(stated[f"K0_{axis}"].u ** 2 - exact[f"K0_{axis}"].u ** 2)
-        assert more == pytest.approx(stated[f"K1_{axis}"].value * size * g**2, rel=1e-3)
-        assert stated[f"K1_{axis}"].u == pytest.approx(exact[f"K1_{axis}"].u, rel=1e-6)
+        most = stated[f"K1_{axis}"].value * size * g**2
+        assert 0.9 * most < more < 1.001 * most
+        assert stated[f"K1_{axis}"].u == pytest.approx(exact[f"K1_{axis}"].u, rel=1e-3)

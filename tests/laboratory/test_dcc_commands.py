@@ -93,7 +93,7 @@ def test_a_certificate_is_applied_and_compared(folder, capsys):
         assert run(["apply", calibration, *recorded, "--out", out]) == 0
     assert (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
     assert run(["compare", "c.xml", "r.json"]) == 0
-    assert "all 33 together with a probability of 1" in capsys.readouterr().out
+    assert "all 36 together with a probability of 1" in capsys.readouterr().out
 
 
 WRITE = ["certificate", "r.json", "--lab", "lab.toml", "--number", "1", "--out", "c.xml"]

@@ -39,6 +39,41 @@ def codes(estimate):
     return [finding.code for finding in estimate.findings]
 
 
+# Rows that are no samples.
+
+
+def test_values_that_stand_for_several_rows_count_once():
+    """N is of the true rate; of the rows it would be 6 % low here."""
+    N = 0.02
+    values = NoiseModel(N=N).simulate(4000, 7.0 / RATE, np.random.default_rng(4))[:, 0]
+    result = noise_of(record(column("gyro_x", "rad/s", np.repeat(values, 7))))
+    assert "held_samples" in codes(result.estimate)
+    assert abs(result.estimate["N_gyro_x"].value - N) < 4.0 * result.estimate["N_gyro_x"].u
+    assert result.channels[0].curve.interval == pytest.approx(7.0 / RATE)
+
+
+def test_an_erased_tail_and_rows_of_another_packet_are_left_out():
+    x = 0.1 * white(4000, 5)
+    plain = noise_of(record(column("gyro_x", "rad/s", x))).estimate
+    erased = noise_of(record(column("gyro_x", "rad/s", np.append(x, np.zeros(400))))).estimate
+    assert erased["N_gyro_x"].value == plain["N_gyro_x"].value
+    t = np.arange(4000) / RATE
+    both = np.concatenate([t, t[::2] + 0.3 / RATE])
+    order = np.argsort(both)
+    mixed = column("gyro_x", "rad/s", np.append(x, np.full(2000, np.nan))[order], both[order])
+    assert noise_of(record(mixed)).estimate["N_gyro_x"].value == pytest.approx(
+        plain["N_gyro_x"].value, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("noise", [0.3, 2.0])
+def test_a_noise_below_the_steps_of_the_output_is_suspect(noise):
+    values = 0.01 * np.rint(0.4 + noise * np.random.default_rng(6).standard_normal(3000))
+    estimate = noise_of(record(column("gyro_x", "rad/s", values))).estimate
+    assert ("coarse_output" in codes(estimate)) == (noise < 1.0)
+    assert (estimate.status is Status.SUSPECT) == (noise < 1.0)
+
+
 # Numbers.
 
 

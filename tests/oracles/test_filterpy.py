@@ -6,11 +6,11 @@ import pytest
 from paper_study import study
 
 from inercal.foundation.inference.sigma_point import EIGEN, root
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import quaternion
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.settings import Filter
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 STEPS = 400
 

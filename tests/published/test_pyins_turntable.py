@@ -11,17 +11,16 @@ largest of nine errors is above 0.03 % in six of ten recordings, also with the b
 
 import numpy as np
 import pytest
+from new_studies import table_read
 
 from inercal.examples import FOLDER
-from inercal.faces.studies.imu import AidedTable, aided_settings
+from inercal.faces.studies.imu import aided_settings
 from inercal.faces.validate.imu import TABLE_ACC, TABLE_ACC_BIAS, TABLE_GYRO
-from inercal.foundation._toml import check
-from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.read import read
 from inercal.systems.imu.aided.calibration import calibrate_aided
-from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.settings import AidedRig, ImuSettings
 
 ACC, GYRO, ACC_BIAS = map(np.array, (TABLE_ACC, TABLE_GYRO, TABLE_ACC_BIAS))  # the bias: mean over the test
 GYRO_BIAS = np.array([0.0007962550847312129, 0.0002793371758986746, 0.0028202067690031776])  # at the start
@@ -45,7 +44,7 @@ UNKNOWN_HEADING = {**TABLE, "rig": {**TABLE["rig"], "base": {}}}
 
 
 def calibrated(table):
-    options = aided_settings(check(AidedTable, table, "study", StudyError), "study")
+    options = aided_settings(table_read(AidedRig, table), "study")
     site = Site(9.81507294711262, (), np.radians(55.0))
     return calibrate_aided(read(FOLDER / "table.npz"), ImuSettings(site), options).estimate
 

@@ -13,7 +13,6 @@ from inercal.foundation.geometry.rotations import boxminus, boxplus
 from inercal.foundation.inference.sigma_point import NEGATIVE
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.before.path_design import at_rest, with_stops
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.filters import quaternion
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
@@ -24,6 +23,7 @@ from inercal.systems.selfcal.platform.kinematics import attitude
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.rig import Base
 from inercal.systems.selfcal.settings import Filter, Gating
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 SEED, SEEDS = 20261121, range(8)
 SIZE = np.abs(TRUTH[:18])

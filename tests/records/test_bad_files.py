@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import CODES
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 ROWS = np.column_stack([np.arange(60) / 100, np.random.default_rng(5).standard_normal((60, 2))])
 TEXT = (

@@ -8,8 +8,8 @@ from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from inercal.foundation.errors import MapError, MissingExtraError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import canonical_units, read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 N = 300
 RNG = np.random.default_rng(25)

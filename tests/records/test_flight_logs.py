@@ -7,8 +7,8 @@ import pytest
 from spoiled import dataflash_log, ulog_file
 
 from inercal.foundation.errors import RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 RNG = np.random.default_rng(47)
 GYRO = RNG.standard_normal((200, 3)).astype("f4")

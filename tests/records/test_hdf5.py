@@ -7,8 +7,8 @@ import pytest
 from scipy.io import netcdf_file, savemat
 
 from inercal.foundation.errors import MapError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import canonical_units, read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 RNG = np.random.default_rng(21)
 N = 120

@@ -11,8 +11,8 @@ import scipy.io
 from scipy.io import savemat
 
 from inercal.foundation.errors import MapError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import mat, read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 TABLE = np.column_stack([np.arange(50) / 100, np.random.default_rng(0).standard_normal((50, 3))])

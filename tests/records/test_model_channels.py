@@ -3,8 +3,8 @@
 import numpy as np
 from nptdms import ChannelObject, TdmsWriter
 
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 from inercal.foundation.records.titles import numbered, titled
 from rows import for_each
 

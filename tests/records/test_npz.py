@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from inercal.foundation.errors import MapError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 T = np.arange(50) / 100

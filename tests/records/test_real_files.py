@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 EXAMPLES = Path(str(files("inercal"))) / "examples"
 EARTH_RATE = 7.292115e-5
-NO_RATE = "PUT THE SAMPLE RATE HERE, such as 100 Hz"
+NO_RATE = 'rate = "?"'
 
 
 def mapped(path, text):
@@ -78,7 +78,7 @@ def test_the_sections_of_a_labelled_session(tmp_path):
         path,
         mapped(
             tmp_path / "m.toml",
-            guess_map(path).replace(NO_RATE, "204.8 Hz"),
+            guess_map(path).replace(NO_RATE, 'rate = "204.8 Hz"'),
         ),
     )
     labels = np.array(record.labels)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.recognise.clocks import clock
 from inercal.foundation.records.recognise.lines import heading
+from inercal.foundation.records.recognise.map_text import guess_map
 from inercal.foundation.records.recognise.physics import G0, gravity_unit, lattice_unit, turns
 from inercal.foundation.records.recognise.words import said
 from rows import for_each
@@ -62,6 +62,9 @@ def written(path, head, rows, delimiter=","):
         ("gy", "gyro", "y", ""),
         ("", "", "", ""),
         ("tiempo_ms", "t", "", "ms"),
+        ("X [s]", "t", "", "s"),
+        ("ms", "t", "", "ms"),
+        ("Kanal 2 [m/s²]", "acc", "y", "m/s^2"),
     ],
 )
 def test_words_say_the_sensor_its_axis_and_unit(name, sensor, axis, unit):
@@ -137,17 +140,26 @@ def test_a_gyro_without_a_unit_is_read_by_its_turns(tmp_path_factory, unit):
         np.column_stack([T, ACC, GYRO * size]),
     )
     text = guess_map(path)
-    assert "QUESTION" not in text
+    assert "guess" not in text
     assert "certain" in text
     (path.parent / "map.toml").write_text(text)
     np.testing.assert_allclose(read(path, path.parent / "map.toml")["gyro_x"].si(), GYRO[:, 0], atol=1e-7)
+
+
+@for_each(("head", "unit"), [("gx,gy,gz", "deg/s"), ("gyroADC[0],gyroADC[1],gyroADC[2]", "deg/s")])
+def test_whole_degrees_per_second_are_no_counts(tmp_path_factory, head, unit):
+    """By the turns; of Betaflight by its name, for a log at rest too."""
+    whole = np.round(np.degrees(GYRO))
+    rows = np.column_stack([T, ACC, whole if "ADC" not in head else np.sign(whole)])
+    path = written(tmp_path_factory.mktemp("a") / "log.csv", f"time,ax,ay,az,{head}\n", rows)
+    assert tomllib.loads(guess_map(path))["columns"]["gyro_x"]["unit"] == unit
 
 
 def test_what_nothing_tells_is_asked_once(tmp_path):
     """A gyro at rest alone, without a unit."""
     rows = np.column_stack([T, 0.0123457 * GYRO])
     text = guess_map(written(tmp_path / "log.csv", "time,gx,gy,gz\n", rows))
-    assert text.count("# QUESTION: Is the gyro in ") == 1
+    assert len({line for line in text.splitlines() if line.startswith('question = "Is the gyro in ')}) == 1
 
 
 @for_each(

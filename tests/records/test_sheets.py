@@ -9,8 +9,8 @@ import openpyxl
 import pytest
 
 from inercal.foundation.errors import RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import canonical_units, read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 RNG = np.random.default_rng(48)
 T = np.arange(50) / 100

@@ -7,8 +7,8 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from inercal.foundation.errors import MapError, MissingExtraError, RecordError
-from inercal.foundation.records.guess import guess_map
 from inercal.foundation.records.read import canonical_units, read
+from inercal.foundation.records.recognise.map_text import guess_map
 
 RNG = np.random.default_rng(24)
 ACC = np.array([0.1, -0.2, 9.8]) + 0.01 * RNG.standard_normal((600, 3))

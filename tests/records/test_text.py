@@ -216,7 +216,7 @@ def test_rows_of_a_test_on_a_table_are_counted_where_no_time_is_said(tmp_path, h
         ),
         ("t [s],acc_x [g],acc_x [g]\n1,2,3\n", "line 1: found acc_x twice, expected each column once"),
         ("t [s],acc_x [g]\n1,2,3\n1,2,3\n", "line 1: found 2 names over rows of 3 fields"),
-        ("acc_x [g]\n1.0\n2.0\n", r'found no time column t, expected one, or \[time\] rate = "100 Hz"'),
+        ("acc_x [g]\n1.0\n2.0\n", r'found no time column t, expected one, .* \[time\] rate = "100 Hz"'),
         ("t [s]\n1.0\n2.0\n", "found a time column alone"),
         ("\x00\x01\x02PNG\x00\x00", "found a zero byte, expected text"),
     ],

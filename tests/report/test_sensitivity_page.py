@@ -16,7 +16,7 @@ from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.foundation.rigs.tables import turntable
 from inercal.systems.turntable.figures.sensitivity import _even_grid, _map, interactions, maps
 from inercal.systems.turntable.figures.sensitivity import page as sensitivity_page
-from inercal.systems.turntable.sensitivity.analysis import analyse
+from inercal.systems.turntable.sensitivity import analyse
 from inercal.systems.turntable.settings import Analysis, PositionDesign, TurntableSettings
 
 ARCMIN = np.radians(1.0 / 60.0)

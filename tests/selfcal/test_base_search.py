@@ -15,12 +15,12 @@ from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import Site, gravity
 from inercal.foundation.geometry.rotations import exp, to_matrix
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.find_base import heading, is_rough, relative, with_base
 from inercal.systems.selfcal.platform.coefficients import BETA
 from inercal.systems.selfcal.platform.rig import Base, Gimbals
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 FRAMES = st.sampled_from(["nue", "enu", "ned"])

@@ -20,7 +20,6 @@ from inercal.foundation.geometry.rotations import (
     right_jacobian,
 )
 from inercal.systems.selfcal.before.bounds import bounds
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.batch import _terms_at, estimate_map, inverse_diagonal
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.residuals import (
@@ -34,6 +33,7 @@ from inercal.systems.selfcal.platform.coefficients import product_slope, to_line
 from inercal.systems.selfcal.platform.plan import path
 from inercal.systems.selfcal.platform.recording import Steps
 from inercal.systems.selfcal.settings import Filter, Gating
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 EXTENDED_TRUTH = TRUTH + np.append(np.zeros(18), [40e-6, -60e-6, 80e-6, 1e-4, -2e-4, 1.5e-4])
 

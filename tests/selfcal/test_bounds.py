@@ -12,7 +12,6 @@ from scipy import stats
 from inercal.foundation.geometry.rotations import boxminus, exp, multiply, rotate
 from inercal.systems.selfcal.before.bounds import SOURCES, bounds, recorded_bounds
 from inercal.systems.selfcal.before.observability import observability
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.plain import accelerometers, platform_rate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -22,6 +21,7 @@ from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, motion
 from inercal.systems.selfcal.platform.rig import Gimbals
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Filter, Gating, Noise
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 
 def along(study, **other):

@@ -25,7 +25,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Filter
-from inercal.systems.selfcal.before.simulate import experiment, simulate
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 found = {}
 for extended in (False, True):

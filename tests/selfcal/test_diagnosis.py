@@ -8,12 +8,12 @@ from paper_study import ARCSEC, DEG, NOISE, PPM, TRUTH, study
 
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Harm
 from inercal.foundation.geometry.rotations import exp, rotate
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.rig import Base
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 PROBLEM = problem(study())
 

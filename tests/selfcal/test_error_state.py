@@ -17,7 +17,6 @@ from inercal.foundation.geometry.rotations import (
     skew,
     to_matrix,
 )
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import error_state
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
@@ -27,6 +26,7 @@ from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
 from inercal.systems.selfcal.platform.rig import Gimbals, World
 from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, state_vector
 from inercal.systems.selfcal.settings import Filter
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 EXTENDED = Filter(extended=True)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic
 from inercal.systems.selfcal.filters.problem import problem
@@ -14,6 +13,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import NAMES
 from inercal.systems.selfcal.platform.states import BIAS_WALK, EXTENDED_MODEL
 from inercal.systems.selfcal.settings import Noise, PlatformStates
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 STUDY = study(path="best")
 COARSE = Noise(0.1 * DEG / 60.0, 5000.0 * MICRO_G, 600.0 * ARCSEC)

@@ -14,13 +14,13 @@ from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
 from inercal.foundation.records.record import Record
 from inercal.systems.selfcal.before.bounds import recorded_bounds
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.filters.gaps import broken, held_rate, taken_anew, with_held
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
 from inercal.systems.selfcal.platform.kinematics import attitude
 from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 
 BEST = study("best")
 SEEDS = range(6)

@@ -9,7 +9,6 @@ from paper_study import DEG, study
 from unscented_twin import RIGS, angle_rates, gimbal, joints
 
 from inercal.foundation.geometry.rotations import boxminus, conjugate, exp, multiply, rotate
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import gimbal as model
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -19,6 +18,7 @@ from inercal.systems.selfcal.platform.kinematics import angles, parity
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.rig import Gimbals, World
 from inercal.systems.selfcal.settings import Filter
+from inercal.systems.selfcal.simulate import experiment, simulate
 from rows import for_each
 
 EVERY_RIG = tuple(product(permutations("xyz"), product((1, -1), repeat=3)))

@@ -14,11 +14,11 @@ from scipy.stats import chi2
 from inercal.faces.studies.load import load_selfcal_study
 from inercal.foundation.findings import Status
 from inercal.foundation.records.read import read
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
 from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.simulate import experiment, simulate
 from inercal.systems.selfcal.task import calibrate
 
 SILENT = Noise(1e-30, 1e-30, 1e-30)

@@ -8,9 +8,9 @@ from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 D = np.pi / 180.0

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from paper_study import ARCSEC, study
 
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis import small
 from inercal.systems.selfcal.diagnosis.small import small_errors
 from inercal.systems.selfcal.filters import averaged, run
@@ -16,6 +15,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.settings import Filter, Noise
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 SETTINGS = study("best")
 OF = problem(SETTINGS)

@@ -11,7 +11,6 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.files import to_json
 from inercal.systems.selfcal.before.bounds import recorded_bounds
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.diagnosis.gross import implausible
 from inercal.systems.selfcal.filters.problem import problem
@@ -19,6 +18,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import NAMES, to_product, units
 from inercal.systems.selfcal.platform.rig import Base
 from inercal.systems.selfcal.result.outcome import assemble, verdict
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 LATITUDE_U = 0.02 * DEG
 GRAVITY_U = 1e-4

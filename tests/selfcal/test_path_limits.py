@@ -12,7 +12,6 @@ from inercal.foundation.errors import StudyError
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.before.path_design import design
 from inercal.systems.selfcal.before.path_search import criterion, search, shifts, unmodelled
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.limits import LIMITS
@@ -21,6 +20,7 @@ from inercal.systems.selfcal.platform.joint_limits import ForbiddenAngles, Joint
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, motion, path
 from inercal.systems.selfcal.platform.states import ALL
 from inercal.systems.selfcal.settings import Search
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 D = np.pi / 180.0
 SLOW_OUTER = JointLimits(rate=(0.5 * D, 1.0 * D, 1.0 * D))

@@ -9,13 +9,13 @@ from paper_study import study
 
 from inercal.foundation.geometry.rotations import exp, multiply
 from inercal.foundation.inference.sigma_point import CHOLESKY, FACTORS, NEGATIVE, root
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters import error_state, quaternion
 from inercal.systems.selfcal.filters.problem import AttitudeStart, problem
 from inercal.systems.selfcal.platform.coefficients import to_linear
 from inercal.systems.selfcal.platform.kinematics import attitude, joint_axes
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.settings import Filter, Gating
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 #: a path on which all three joints turn, 431 rows
 MIXED = PlatformPlan((Turn("y", 0.5), Turn("z", -0.6), Turn("x", 0.4)), start=(0.3, -0.2, 0.1))

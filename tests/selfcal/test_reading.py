@@ -19,10 +19,10 @@ from inercal.foundation.records.read import read
 from inercal.foundation.records.record import Record
 from inercal.foundation.records.write import SUFFIXES, write_record
 from inercal.foundation.units import parse_unit
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.rig import Gimbals
 from inercal.systems.selfcal.reading import recording_of
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 # All three joints turn; 108 s.

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from paper_study import PRIOR, TRUTH, study
 from scipy.stats import chi2
 
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 SEED = 20261122
 

@@ -10,7 +10,6 @@ from paper_study import ARCSEC, DEG, MICRO_G, TRUTH, study
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput
 from inercal.foundation.geometry.rotations import boxplus
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.figures import pictures
 from inercal.systems.selfcal.figures.filters import changes_of_turn
 from inercal.systems.selfcal.filters.problem import problem
@@ -23,6 +22,7 @@ from inercal.systems.selfcal.result.comparison import (
     stated_variance,
     with_stated,
 )
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate, compared
 
 PLAIN = study("best")

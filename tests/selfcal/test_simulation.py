@@ -19,7 +19,6 @@ from inercal.foundation.geometry.rotations import (
     normalize,
     rotate,
 )
-from inercal.systems.selfcal.before.simulate import experiment, flicker, simulate, to_record
 from inercal.systems.selfcal.disturbances import Disturbances, EncoderHarmonic, Sway
 from inercal.systems.selfcal.filters.plain import accelerometers, on_the_base, platform_rate
 from inercal.systems.selfcal.filters.residuals import gimbals
@@ -31,6 +30,7 @@ from inercal.systems.selfcal.platform.rig import Base, Gimbals
 from inercal.systems.selfcal.platform.states import ALL, EXTENDED_MODEL, PAPER, StateVector, state_vector
 from inercal.systems.selfcal.platform.truth import PlatformTruth, simulate_truth
 from inercal.systems.selfcal.settings import Noise
+from inercal.systems.selfcal.simulate import experiment, flicker, simulate, to_record
 
 PLAN = PlatformPlan(
     (Turn("z", 60 * DEG), Turn("x", 90 * DEG), Turn("y", 40 * DEG), Rest(4.0)),

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from paper_study import ARCSEC, study
 
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 
 def named(th_of):

@@ -9,7 +9,6 @@ from paper_study import ARCSEC, DEG, TRUTH, study
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput
 from inercal.systems.selfcal.before.bounds import recorded_bounds
-from inercal.systems.selfcal.before.simulate import experiment, simulate
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.diagnosis.fit_quality import filtered
 from inercal.systems.selfcal.diagnosis.small import likely, small_errors
@@ -18,6 +17,7 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.rig import Base
 from inercal.systems.selfcal.result.budget import stated_errors, systematic_inputs
 from inercal.systems.selfcal.result.outcome import assemble, verdict
+from inercal.systems.selfcal.simulate import experiment, simulate
 
 PLAIN = study(path="best")
 PLAIN_LIMIT = 6.0 + 5.0 * np.sqrt(12.0 / 2700.0)

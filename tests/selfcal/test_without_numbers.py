@@ -13,7 +13,6 @@ from inercal.foundation.geometry.earth import GravityInput
 from inercal.foundation.results.budget import combine
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.before.observability import not_positive
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
@@ -24,6 +23,7 @@ from inercal.systems.selfcal.result.budget import stated_errors
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.result.outcome import assemble
 from inercal.systems.selfcal.settings import Filter, Noise
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.task import calibrate
 
 SHORT = study(
@@ -83,31 +83,6 @@ def test_gravity_stated_so_uncertainly_that_no_filter_follows_is_said():
     found = estimated(replace(SHORT, site=site), recorded(SHORT))
     assert found.status is Status.ILL_CONDITIONED
     assert found.message.startswith("gravity: stated so uncertainly")
-
-
-def test_what_is_taken_as_exact_has_an_unknown_effect_where_no_filter_follows(monkeypatch):
-    """An effect that is no number is said in words."""
-    true = sources.estimate
-
-    def lost(*given, **more):
-        return replace(true(*given, **more), coefficients=np.full(18, np.nan))
-
-    monkeypatch.setattr(sources, "estimate", lost)
-    recording = recorded(SHORT)
-    run = true(recording, sources.problem(SHORT), "error-state")
-    found, exact = sources.systematic(recording, SHORT, run, np.ones(18))
-    assert not found
-    assert set(exact) == {
-        "latitude",
-        "gravity",
-        "heading",
-        "tilt about north",
-        "tilt about east",
-    }
-    assert all(
-        words == f"an unknown error of {name}, as the filter does not follow it"
-        for name, words in exact.items()
-    )
 
 
 def test_the_parts_of_a_covariance_are_symmetric_and_add_up_to_it():

@@ -8,8 +8,8 @@ from grades import GRADES, MEMS, NAV, drawn, fitted, u_by_kind
 from scipy.stats import chi2, norm
 
 from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.restricted import opened, residuals, with_noise_shown
 from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
-from inercal.systems.strapdown.noise.restricted import opened, residuals, with_noise_shown
 from inercal.systems.strapdown.settings import ESTIMABLE, Motion
 from inercal.systems.strapdown.simulate import simulated
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from inercal.systems.strapdown.noise.unmodelled import Candidate, Posed, told_apart
-from inercal.systems.strapdown.noise.unmodelled import tests as unmodelled
+from inercal.systems.strapdown.fit.unmodelled import Candidate, Posed, told_apart
+from inercal.systems.strapdown.fit.unmodelled import tests as unmodelled
 
 ROWS, COEFFICIENTS = 400, 4
 SENSORS = {0: "one", 1: "other"}

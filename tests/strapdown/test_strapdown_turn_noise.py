@@ -11,8 +11,8 @@ from scipy.stats import chi2
 import inercal as ic
 from inercal.foundation.findings import Status
 from inercal.systems.strapdown.fit.batch import fit
+from inercal.systems.strapdown.fit.restricted import opened, separated, solved, with_noise
 from inercal.systems.strapdown.fit.rests import found_rests, nodes_of
-from inercal.systems.strapdown.noise.restricted import opened, separated, solved, with_noise
 from inercal.systems.strapdown.settings import TURN_NOISE, WALKS
 from inercal.systems.strapdown.simulate import simulated, to_record
 from inercal.systems.strapdown.task import calibrate

@@ -89,7 +89,8 @@ def test_chi_square_falls_as_in_another_program(terms, expected):
 def test_noise_that_the_record_shows_is_that_found_by_hand():
     """Walks of 40 ug/sqrt(s) and 1 cm/s over turns made the halves of the record agree in another program."""
     found = with_all()
-    assert found.status.value == "ok"
+    # accelerometers bend by some u of K1 between half and full scale, which no other test of this record sees
+    assert {finding.code for finding in found.findings if finding.harm} <= {"by_reading"}
     assert found.result["walks"]["accelerometer"] / 9.80665e-6 == pytest.approx(40.0, rel=0.5)
     assert found.result["turn_noise"]["velocity"] == pytest.approx(0.01, rel=0.5)
     assert "by 1 cm/s and" in next(each.message for each in found.findings if each.code == "turn_noise")

@@ -16,7 +16,6 @@ from inercal.foundation.errors import InputError, RecordError, StudyError
 from inercal.foundation.records.maps import read_map
 from inercal.foundation.records.read import read
 from inercal.foundation.records.write import write_record
-from inercal.systems.selfcal.before.simulate import experiment, simulate, to_record
 from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.filters.filter_result import product_form
 from inercal.systems.selfcal.filters.problem import problem
@@ -26,6 +25,7 @@ from inercal.systems.selfcal.platform.plan import PlatformPlan, Rest, Turn
 from inercal.systems.selfcal.reading import recording_of
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.settings import Filter, Gating
+from inercal.systems.selfcal.simulate import experiment, simulate, to_record
 
 DEG = np.pi / 180.0
 RECURSIVE = ("error-state", "svd-qukf", "gimbal-ukf")

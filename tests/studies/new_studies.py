@@ -2,8 +2,13 @@
 
 from functools import partial
 
+from pydantic import create_model
+
 from inercal.faces.studies.load import load_study
+from inercal.faces.studies.tables import Stated
 from inercal.faces.studies.template import template
+from inercal.foundation._toml import Strict, check
+from inercal.foundation.errors import StudyError
 from inercal.systems.listed import SYSTEMS
 
 SITE = ("site.latitude=45(26) deg", "site.height=0(300) m")
@@ -20,3 +25,9 @@ FILL = [each for key in SITE for each in ("--set", key)]
 
 load_turntable_study = partial(load_study, SYSTEMS["turntable"])
 """Settings of the study of a turntable, as those of the other systems."""
+
+
+def table_read(settings, keys):
+    """Settings of one table with these keys."""
+    file = create_model("File", __base__=Strict, table=(Stated[settings], ...))
+    return check(file, {"table": keys}, "study", StudyError).table

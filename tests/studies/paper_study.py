@@ -74,5 +74,6 @@ def gating_costs(motion, problem, truth=None):
     return {
         (rule, stops): u(Gating(rule, stops)) / free
         for rule in get_args(kinds["rule"])
+        if rule != "off"
         for stops in get_args(kinds["stops"])
     }

@@ -138,7 +138,7 @@ def load(tmp_path):
         ),
         (
             ERRORS + 'deps_x = { value = "1(1) arcsec", scope = "run" }',
-            "rig.errors.deps_x: scope: found with what is measured alone, expected it with a distribution",
+            "rig.errors.deps_x.scope: found with what is measured alone, expected it with a distribution",
         ),
         (ERRORS + 'deps_x = { value = "11 deg" }', "that is 0.191986 rad, expected an angle within 10 deg"),
         (
@@ -148,7 +148,7 @@ def load(tmp_path):
         (
             ERRORS
             + 'dphi_y1.harmonics = [{ order = 2, amplitude = "1 arcsec" }, { order = 2, amplitude = "1 arcsec" }]',
-            "rig.errors.dphi_y1: harmonics.1.order: found 2 twice, expected each order once",
+            "rig.errors.dphi_y1.harmonics.1.order: found 2 twice, expected each order once",
         ),
         (
             ERRORS + 'dphi_y1 = { table = "gone.csv" }',
@@ -167,7 +167,7 @@ def load(tmp_path):
         ),
         (
             CHAIN + 'chain = [{ joint = "phi1", axis = "z", normal = "1 arcsec" }]',
-            "rig.chain.0: normal: found with a joint, expected it with an error only",
+            "rig.chain.0.normal: found with a joint, expected it with an error only",
         ),
         (
             CHAIN + f'chain = [{JOINT}, {{ error = "e", axis = "z" }}]',
@@ -175,7 +175,7 @@ def load(tmp_path):
         ),
         (
             CHAIN + f'chain = [{JOINT}, {{ error = "1 e", axis = "z", normal = "1 arcsec" }}]',
-            "rig.chain.1: error: found '1 e', expected a name of letters, digits and _",
+            "rig.chain.1.error: found '1 e', expected a name of letters, digits and _",
         ),
         (
             CHAIN + f"chain = [{JOINT}, {E}, {E}]",
@@ -187,7 +187,7 @@ def load(tmp_path):
         ),
         (
             CHAIN + f'chain = [{{ turn = "1(1) deg", axis = "x" }}, {JOINT}]',
-            "rig.chain.0: turn: found an uncertainty, expected it as an error with a value beside the turn",
+            "rig.chain.0.turn: found an uncertainty, expected it as an error with a value beside the turn",
         ),
         (
             CHAIN + f'chain = [{JOINT}]\n[rig.errors]\ndefault = {{ normal = "1 arcsec" }}',

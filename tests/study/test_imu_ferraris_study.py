@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+import inercal as ic
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
@@ -57,3 +58,15 @@ def test_what_is_refused(table, words):
 def test_the_schema_shows_the_sections():
     schema = FerrarisTable.model_json_schema()
     assert "x_rot" in schema["$defs"]["SectionsTable"]["properties"]
+
+
+def test_tables_of_a_method_are_keywords_too():
+    """``ic.study("imu", ferraris={...})`` is the study of the same file; so are ``turns`` and the rig of ``aided``."""
+    here = {"gravity": "9.81 m/s^2"}
+    alone = ic.study("imu", **here, method="ferraris", ferraris={"turn": "-360(2) deg"})
+    whole = ic.study("imu", site=here, imu={"method": "ferraris", "ferraris": {"turn": "-360(2) deg"}})
+    assert alone.settings == whole.settings
+    turns = dict.fromkeys("xyz", "360(1) deg")
+    assert ic.study("imu", **here, method="known_turns", turns=turns).settings.method.angles[0] > 6.0
+    table = {"rig": {"kind": "two_axis_turntable"}, "mounting": ["+y", "-x", "+z"]}
+    assert ic.study("imu", latitude="48 deg", method="aided", aided=table).settings.method is not None

@@ -12,9 +12,11 @@ from inercal.faces.studies.tables import Stated, as_typed, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.keys import (
+    AS_TYPED,
     REQUIRED,
     TIME,
     Reading,
+    keyed,
     keys_of,
     option,
     quantities,
@@ -23,6 +25,7 @@ from inercal.foundation.keys import (
     within,
 )
 from inercal.foundation.units import Quantity
+from rows import for_each
 
 ACUTE = within(0.0, 0.5 * math.pi, "an angle from 0 to 90 deg")
 
@@ -212,3 +215,64 @@ def test_what_is_given_is_kept_as_typed():
         "a": {"date": "2026-01-31"},
         "b": [1, "2 m"],
     }
+
+
+class Names(
+    keyed(
+        "ByName", {name: (float | None, quantity("of it", "angle", example="1 deg")) for name in ("a", "b")}
+    )
+):
+    """A table whose keys are names of another one."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """A rig."""
+
+    by_name: Names = table("names", Names())
+    error: Wave | None = table("an error", None, example={"size": "1(1) deg"}, words={"none": "none"})
+    rows: tuple[tuple[float, ...], ...] = quantity("angles", "angle", (), example=[["1 deg"]], least=1)
+    value: object = option("of a term", None, reads=AS_TYPED)
+    terms: tuple[str, ...] | None = option("names", None, least=1)
+    note: str = option("a text", "", most=3)
+
+
+class RigFile(Strict):
+    rig: Stated[Rig]
+
+
+def rig(**keys):
+    return check(RigFile, {"rig": keys}, "s.toml", StudyError).rig
+
+
+def test_tables_by_names_words_in_their_place_and_rows_of_any_length():
+    found = rig(
+        by_name={"b": "180 deg"}, error="none", rows=[["0 deg"], ["0 deg", "180 deg"]], value="2 deg/h/g"
+    )
+    assert (found.by_name.a, found.by_name.b) == (None, math.pi)
+    assert found.rows == ((0.0,), (0.0, math.pi))
+    assert (found.error, found.value) == ("none", "2 deg/h/g")
+    assert rig(error={"size": "180(1) deg"}).error.size == math.pi
+    assert (rig().error, rig().terms, rig(terms=["x"]).terms) == (None, None, ("x",))
+
+
+@for_each(
+    "keys, message",
+    [
+        ({"by_name": {"c": "1 deg"}}, "rig.by_name.c: unknown key, "),
+        (
+            {"error": "some"},
+            'rig.error: found \'some\', expected "none" or a table such as { size = "1(1) deg" }',
+        ),
+        ({"rows": []}, "rig.rows: found [], expected 1 or more in it"),
+        ({"rows": [["x"]]}, "rig.rows.0.0: found 'x', expected a quantity with a unit of angle"),
+        ({"value": ["1 deg"]}, "rig.value: found ['1 deg'], expected a quantity with its unit"),
+        ({"terms": []}, "rig.terms: found [], expected 1 or more in it"),
+        ({"terms": "x"}, "rig.terms: found 'x', expected a list in brackets"),
+        ({"note": "long"}, "rig.note: found 'long'"),
+    ],
+)
+def test_one_sentence_for_what_such_keys_are_not(keys, message):
+    with pytest.raises(StudyError) as caught:
+        rig(**keys)
+    assert message in str(caught.value)

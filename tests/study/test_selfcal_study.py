@@ -22,7 +22,6 @@ from inercal.faces.studies.selfcal import selfcal_study
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import term
 from inercal.systems.selfcal.before.path_design import design
-from inercal.systems.selfcal.before.simulate import experiment
 from inercal.systems.selfcal.estimators import KINDS
 from inercal.systems.selfcal.platform.coefficients import BETA, EXTENDED, NAMES, units
 from inercal.systems.selfcal.platform.plan import PATHS, Rest, Turn, path
@@ -36,6 +35,7 @@ from inercal.systems.selfcal.platform.states import (
     TEMPERATURE,
 )
 from inercal.systems.selfcal.settings import Gating
+from inercal.systems.selfcal.simulate import experiment
 
 # The study of the interface description, to the letter.
 CONTRACT = """

@@ -142,7 +142,16 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
     for other in INSTEAD.get(table, ()) if key in INSTEAD.get(table, ()) else ():
         place.pop(other, None)
     place |= tomllib.loads(line.removeprefix("# "))
-    if table == "imu" and key in ("sections", "section", "placing", "level"):
+    if table == "imu" and key in (
+        "sections",
+        "section",
+        "placing",
+        "level",
+        "misalignment",
+        "mounting",
+        "clock",
+        "g_sensitivity",
+    ):
         place["method"] = "sections"
     if (table, key) == ("imu", "rates"):
         place["method"] = "known_rates"

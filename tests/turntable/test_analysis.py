@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from inercal.faces.studies.turntable import turntable_study
 from inercal.foundation.errors import StudyError
 from inercal.foundation.results.files import plain_objects
-from inercal.systems.turntable.sensitivity.analysis import analyse, result, table
-from inercal.systems.turntable.sensitivity.maps import write_maps
+from inercal.systems.turntable.sensitivity import analyse, result, table
+from inercal.systems.turntable.sensitivity_maps import write_maps
 
 FACTORS = [
     "dphi_y1", "dalpha_x1", "dalpha_z1", "deps_x", "deps_y", "dphi_z2",

@@ -27,7 +27,7 @@ from inercal.foundation.results.files import from_json, to_json
 from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.plans import grid, listed, named
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import calibrate
 
 NOISE = 0.01 * DEG_H
@@ -49,7 +49,7 @@ GYROS = {"D_F_x": 1e-4, "S_x": 1.01, "T_xy": 0.02, "G_xx": 1e-7} | {
 
 def run(settings, seed=1, told=None):
     """A simulated record of one study, calibrated by another or by itself."""
-    return calibrate(simulate(settings, np.random.default_rng(seed)), told or settings)
+    return calibrate(simulate_positions(settings, np.random.default_rng(seed)), told or settings)
 
 
 def values_of(estimate):
@@ -281,7 +281,7 @@ def rewritten(record, unit):
 def test_the_unit_of_the_record_does_not_matter():
     """deg/h or rad/s: the same result in SI, and each shown in the unit of its record."""
     settings = study(FULL_RANK, table(), noise=NOISE)
-    record = simulate(settings, np.random.default_rng(1))
+    record = simulate_positions(settings, np.random.default_rng(1))
     one, other = (calibrate(r, settings) for r in (record, rewritten(record, "rad/s")))
     size = one.estimate.u
     assert np.abs((one.estimate.values - other.estimate.values) / size).max() < 1e-9
@@ -317,7 +317,9 @@ def test_counts_need_a_stated_k_where_the_plan_does_not_tell_it():
 
 
 def test_values_stated_for_one_kind_of_unit_are_refused_for_another():
-    record = simulate(study(FULL_RANK, unit="count", coefficients={"DX_F": 100.0}), np.random.default_rng(1))
+    record = simulate_positions(
+        study(FULL_RANK, unit="count", coefficients={"DX_F": 100.0}), np.random.default_rng(1)
+    )
     with pytest.raises(StudyError, match="stated for outputs in deg/h"):
         calibrate(record, study(FULL_RANK, noise=NOISE))
 
@@ -353,7 +355,7 @@ def test_the_latitude_moves_the_estimate_as_the_budget_says(earth_rate):
     """Against a calibration at a latitude that differs by its uncertainty, with the same weights."""
     step = np.radians(0.05)
     settings = study(FULL_RANK, noise=NOISE, earth_rate=earth_rate)
-    record = simulate(settings, np.random.default_rng(1))
+    record = simulate_positions(settings, np.random.default_rng(1))
 
     def at(latitude):
         return calibrate(record, replace(settings, site=Site(9.8, (), latitude, step))).estimate
@@ -370,7 +372,7 @@ def test_gravity_moves_accelerometers_as_the_budget_says():
     settings = study(
         grid((7, 8)), kind="accelerometer", unit="m/s^2", coefficients=ACCELEROMETERS, noise=1e-4
     )
-    record = simulate(settings, np.random.default_rng(1))
+    record = simulate_positions(settings, np.random.default_rng(1))
 
     def under(gravity):
         site = Site(gravity, (GravityInput("gravity", step, "m/s^2", 1.0),), LATITUDE)
@@ -395,7 +397,7 @@ def test_gravity_does_not_matter_to_a_gyrowheel():
 def test_a_stated_term_moves_the_estimate_as_the_budget_says(symbol):
     step = 1e-3
     settings = study(TUMBLE, noise=NOISE)
-    record = simulate(settings, np.random.default_rng(1))
+    record = simulate_positions(settings, np.random.default_rng(1))
 
     def told(coefficients, **more):
         return calibrate(record, study(TUMBLE, noise=NOISE, coefficients=coefficients, **more)).estimate
@@ -447,7 +449,7 @@ def test_accelerometers_whose_noise_is_not_stated_are_known_as_well_as_those_who
     unstated = replace(settings, instrument=replace(settings.instrument, noise=None))
     rng = np.random.default_rng(20261121)
     for _ in range(3):
-        record = simulate(settings, rng)
+        record = simulate_positions(settings, rng)
         known, found = (calibrate(record, each).estimate for each in (settings, unstated))
         assert found.status is Status.OK
         assert np.all(found.u < 1.7 * known.u)
@@ -480,7 +482,7 @@ def test_squares_of_errors_that_stay_are_fitted_where_there_is_no_noise_above_th
     """Errors that stay are found with the terms, as well as the noise allows: without any only their squares are left,
     (1e-3)^2 of earth rate, which no u of first order holds. Noise of 0.01 deg/h is 700 times that."""
     settings = study(FULL_RANK, table().with_scope(Scope.RIG), noise=noise, earth_rate="stated")
-    made = simulate(
+    made = simulate_positions(
         replace(settings, instrument=replace(settings.instrument, noise=noise or 0.0)),
         np.random.default_rng(2),
     )
@@ -493,7 +495,7 @@ def test_squares_of_errors_that_stay_are_fitted_where_there_is_no_noise_above_th
 def test_errors_that_stay_are_called_too_large_where_their_cubes_matter_against_u():
     """Without noise, cubes of a degree shift terms by a fifth of u, and values are several u off."""
     settings = study(FULL_RANK, table(60.0 * ARCMIN).with_scope(Scope.RIG), noise=None, earth_rate="stated")
-    made = simulate(
+    made = simulate_positions(
         replace(settings, instrument=replace(settings.instrument, noise=0.0)), np.random.default_rng(2)
     )
     assert "large_errors" in codes_of(calibrate(made, settings).estimate)
@@ -509,14 +511,14 @@ def test_a_relative_term_without_its_gain_is_refused():
         noise=1e-4,
         terms=("K0_x", "K1_x"),
     )
-    record = simulate(settings, np.random.default_rng(1))
+    record = simulate_positions(settings, np.random.default_rng(1))
     told = replace(settings, instrument=replace(settings.instrument, coefficients={"K2_x": 1e-5}))
     with pytest.raises(StudyError, match="K2_x relate to K1_x, expected a value of K1_x too"):
         calibrate(record, told)
 
 
 def test_a_reading_that_does_not_belong_is_named():
-    record = simulate(study(FULL_RANK, noise=NOISE), np.random.default_rng(1))
+    record = simulate_positions(study(FULL_RANK, noise=NOISE), np.random.default_rng(1))
     y = record["y_x"].values.copy()
     y[6] += 100.0 * NOISE / DEG_H
     wrong = replace(record, columns=record.columns | {"y_x": replace(record["y_x"], values=y)})

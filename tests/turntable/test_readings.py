@@ -12,8 +12,8 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.positions.simulate import simulate
 from inercal.systems.turntable.readings import readings
+from inercal.systems.turntable.simulate import simulate_positions
 
 JOINTS = ("phi1", "phi2")
 SOURCE = Source("test.csv", "")
@@ -36,8 +36,8 @@ def record_of(angles_deg, y, position=None, unit="deg/h", channels=("y_x",)):
 
 def test_sampled_dwells_give_the_same_readings_as_one_row_each():
     """Without noise and errors the mean of a dwell is the reading."""
-    rows = readings(simulate(study(TUMBLE), np.random.default_rng(1)), JOINTS, "gyrowheel")
-    sampled = simulate(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
+    rows = readings(simulate_positions(study(TUMBLE), np.random.default_rng(1)), JOINTS, "gyrowheel")
+    sampled = simulate_positions(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
     found = readings(sampled, JOINTS, "gyrowheel")
     assert_allclose(found.y, rows.y, rtol=1e-12)
     assert_allclose(found.angles, rows.angles, atol=1e-12)
@@ -50,7 +50,7 @@ def test_sampled_dwells_give_the_same_readings_as_one_row_each():
 def test_the_scatter_within_the_dwells_tells_the_noise_of_a_mean():
     """White noise: standard deviation over the root of the number of samples (relative error 1/sqrt(2 dof))."""
     settings = study(TUMBLE, dwell=20.0, sample_rate=10.0, noise=0.05 * DEG_H)
-    found = readings(simulate(settings, np.random.default_rng(2)), JOINTS, "gyrowheel")
+    found = readings(simulate_positions(settings, np.random.default_rng(2)), JOINTS, "gyrowheel")
     assert_allclose(found.u_mean, 0.05 * DEG_H, rtol=4.5 / np.sqrt(2 * 24 * 199))
 
 
@@ -60,11 +60,11 @@ def without_numbers(record):
 
 def test_positions_are_found_by_angle_where_they_are_not_numbered():
     """Neighbours in the 24-position tumble differ by 45 deg or more, but for repeated attitudes."""
-    sampled = simulate(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
+    sampled = simulate_positions(study(TUMBLE, dwell=4.0, sample_rate=10.0), np.random.default_rng(1))
     by_number = readings(sampled, JOINTS, "gyrowheel")
     by_angle = readings(without_numbers(sampled), JOINTS, "gyrowheel")
     assert_allclose(by_angle.y, by_number.y)
-    one_row = simulate(study(TUMBLE), np.random.default_rng(1))
+    one_row = simulate_positions(study(TUMBLE), np.random.default_rng(1))
     assert len(readings(without_numbers(one_row), JOINTS, "gyrowheel").y) == 24
 
 
@@ -193,14 +193,14 @@ def test_a_record_that_cannot_be_read_is_refused(record, says):
 
 
 def test_a_missing_joint_is_named():
-    record = simulate(study(TUMBLE, table(0.0), coefficients=WHEEL_X), np.random.default_rng(1))
+    record = simulate_positions(study(TUMBLE, table(0.0), coefficients=WHEEL_X), np.random.default_rng(1))
     with pytest.raises(RecordError, match="phi3"):
         readings(record, ("phi1", "phi2", "phi3"), "gyrowheel")
 
 
 def test_an_axis_that_the_table_does_not_have_is_refused():
     """Three angles read for a table of two would be another attitude."""
-    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    record = simulate_positions(study(TUMBLE), np.random.default_rng(1))
     third = {"phi3": replace(record["phi2"], name="phi3")}
     with pytest.raises(RecordError, match="found phi3, expected phi1, phi2 alone"):
         readings(replace(record, columns=record.columns | third), JOINTS, "gyrowheel")
@@ -208,14 +208,14 @@ def test_an_axis_that_the_table_does_not_have_is_refused():
 
 def test_a_rate_test_is_not_taken_for_positions():
     """A turning table has no attitude to average over."""
-    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    record = simulate_positions(study(TUMBLE), np.random.default_rng(1))
     rate = {"rate": replace(record["phi2"], name="rate", unit=parse_unit("deg/s"))}
     with pytest.raises(RecordError, match="found the channel rate, that of a rate test"):
         readings(replace(record, columns=record.columns | rate), JOINTS, "gyrowheel")
 
 
 def test_readings_without_an_angle_are_left_out_and_said():
-    record = simulate(study(TUMBLE), np.random.default_rng(1))
+    record = simulate_positions(study(TUMBLE), np.random.default_rng(1))
     angle = record["phi2"].values.copy()
     angle[[2, 16]] = np.nan
     changed = {"phi2": replace(record["phi2"], values=angle)}

@@ -17,8 +17,8 @@ from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
 from inercal.systems.turntable.figures import page, pictures
 from inercal.systems.turntable.settings import Disturbances, RateTest, StepTest
-from inercal.systems.turntable.steps.response import respond, senses
-from inercal.systems.turntable.steps.simulate import sequence
+from inercal.systems.turntable.simulate import sequence
+from inercal.systems.turntable.step_response import respond, senses
 from inercal.systems.turntable.task import calibrate, simulate
 
 UG, ARCSEC, G = 9.80665e-6, np.radians(1.0 / 3600.0), 9.8

@@ -10,8 +10,8 @@ from turntable_studies import DEG_H, LATITUDE, WHEEL, references, study, wheel_o
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.rigs.plans import grid
-from inercal.systems.turntable.positions.simulate import simulate
 from inercal.systems.turntable.settings import Disturbances, RateTest, TableHarmonic
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import simulate as simulate_test
 
 PLAN = grid((6, 6))
@@ -19,7 +19,7 @@ PLAN = grid((6, 6))
 
 def outputs(settings, seed=1, **disturbances):
     """Outputs (n, 2) [rad/s] of the gyrowheel, and their times from the first [s]."""
-    record = simulate(
+    record = simulate_positions(
         replace(settings, disturbances=Disturbances(**disturbances)), np.random.default_rng(seed)
     )
     y = np.stack([record[f"y_{axis}"].si() for axis in "xy"], axis=-1)

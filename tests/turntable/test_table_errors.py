@@ -19,12 +19,11 @@ from inercal.foundation.rigs.chain import Chain, Error, Joint, Scope
 from inercal.foundation.rigs.patterns import Harmonic, Known, Tabulated, normal
 from inercal.foundation.rigs.plans import listed
 from inercal.systems.turntable.model import table_model
-from inercal.systems.turntable.positions.simulate import simulate, truth
 from inercal.systems.turntable.positions.tolerance import shifts
-from inercal.systems.turntable.rate.simulate import simulate_rate_test
 from inercal.systems.turntable.regression import fit
 from inercal.systems.turntable.second_order import second_order
-from inercal.systems.turntable.sensitivity.analysis import analyse
+from inercal.systems.turntable.sensitivity import analyse
+from inercal.systems.turntable.simulate import simulate_positions, simulate_rate_test, truth
 from inercal.systems.turntable.task import calibrate
 
 RUNS = 8
@@ -74,7 +73,7 @@ def test_values_of_an_angle_are_one_unknown_each():
     plan = listed(np.radians([[a, b] for a in (0, 60, 120, 200) for b in (10, 80, 130, 220, 290)] * 2))
     chain = table(1.0 * ARCMIN).with_scope(Scope.ANGLE)
     settings = study(plan, chain, noise=0.001 * DEG_H, earth_rate="stated")
-    estimate = calibrate(simulate(settings, np.random.default_rng(1)), settings)
+    estimate = calibrate(simulate_positions(settings, np.random.default_rng(1)), settings)
     done = estimate.fitting.fit
     table_part = np.zeros((len(done.c), len(done.c)))
     joints = {"dphi_y1": 0, "dalpha_x1": 0, "dalpha_z1": 0, "deps_x": 0, "deps_y": 0}
@@ -112,7 +111,7 @@ def test_what_is_known_is_corrected_and_its_u_stands_under_its_certificate(tmp_p
         known[1].at(np.radians([90.0, 135.0, 315.0])), np.radians([-20, -7.5, 5]) / 3600, rtol=1e-12
     )
     assert settings.chain.factors == ("deps_x", "dphi_z2_table", "dphi_z2")
-    estimate = calibrate(simulate(settings, np.random.default_rng(3)), settings).estimate
+    estimate = calibrate(simulate_positions(settings, np.random.default_rng(3)), settings).estimate
     assert {"K-1: deps_x", "K-2: dphi_z2_table"} <= {item.source for item in estimate.budget}
     assert [source.path for source in estimate.inputs][-1].endswith("encoder.csv")
     # without the correction the drift is off by what 200 arcsec turn of it, many u
@@ -235,8 +234,10 @@ def test_a_chain_of_its_own_is_the_table_that_it_describes():
         DEFAULT, f"rig.chain = [{', '.join(rows)}]"
     )
     own = turntable_study(tomllib.loads(text), "s")
-    record = simulate(usual, np.random.default_rng(5))
-    assert_allclose(simulate(own, np.random.default_rng(5))["y_x"].values, record["y_x"].values, rtol=1e-12)
+    record = simulate_positions(usual, np.random.default_rng(5))
+    assert_allclose(
+        simulate_positions(own, np.random.default_rng(5))["y_x"].values, record["y_x"].values, rtol=1e-12
+    )
     first, second = calibrate(record, usual).estimate, calibrate(record, own).estimate
     assert_allclose(second.values, first.values, rtol=1e-9)
     assert_allclose(second.covariance, first.covariance, rtol=1e-9)

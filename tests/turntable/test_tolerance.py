@@ -22,7 +22,6 @@ from inercal.foundation.rigs.chain import Scope
 from inercal.foundation.rigs.patterns import normal
 from inercal.foundation.rigs.plans import grid
 from inercal.systems.turntable.model import table_model
-from inercal.systems.turntable.positions.simulate import simulate
 from inercal.systems.turntable.positions.tolerance import (
     alternatives,
     coefficient_shares,
@@ -31,6 +30,7 @@ from inercal.systems.turntable.positions.tolerance import (
     sphere_moments,
 )
 from inercal.systems.turntable.regression import fit
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import calibrate
 
 NOISE = 0.01 * DEG_H
@@ -44,7 +44,7 @@ def fitted(chain=None, plan=FULL_RANK, channels=("y_x", "y_y"), left_out=(), noi
 
 def calibrated(kind="gyrowheel", **more):
     settings = study(chain=table(), kind=kind, noise=NOISE, **more)
-    return calibrate(simulate(settings, np.random.default_rng(2)), settings)
+    return calibrate(simulate_positions(settings, np.random.default_rng(2)), settings)
 
 
 def test_noise_and_errors_of_the_table_make_up_the_covariance_of_the_fit():
@@ -76,7 +76,7 @@ def test_the_budget_adds_up_to_the_covariance_also_with_relative_terms():
     settings = study(
         grid((7, 8)), table(), kind="accelerometer", unit="m/s^2", coefficients=coefficients, noise=1e-4
     )
-    done = calibrate(simulate(settings, np.random.default_rng(2)), settings)
+    done = calibrate(simulate_positions(settings, np.random.default_rng(2)), settings)
     fit_, estimate = done.fitting.fit, done.estimate
     slope = np.zeros((len(fit_.c), len(fit_.c)))
     for channel, block in zip(fit_.model.channels, fit_.model.blocks, strict=True):

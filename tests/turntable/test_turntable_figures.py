@@ -23,8 +23,8 @@ from inercal.systems.turntable.display import displayed
 from inercal.systems.turntable.figures import pictures
 from inercal.systems.turntable.figures.design import page as design_page
 from inercal.systems.turntable.positions.planning import design
-from inercal.systems.turntable.positions.simulate import simulate
 from inercal.systems.turntable.settings import Instrument, PositionDesign, TurntableSettings
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import calibrate
 
 DEG_H = parse_unit("deg/h")
@@ -72,7 +72,7 @@ def study(plan, instrument, half_width=2.0 * ARCMIN, **changes):
 
 def calibrated(plan, instrument, half_width=2.0 * ARCMIN):
     settings = study(plan, instrument, half_width)
-    return calibrate(simulate(settings, np.random.default_rng(4)), settings)
+    return calibrate(simulate_positions(settings, np.random.default_rng(4)), settings)
 
 
 def check(page):

@@ -113,7 +113,9 @@ def test_from_a_dropped_log_to_a_certificate(tab, bench, log, tmp_path):
     field.fill("45.4 deg")
     field.press("Tab")
     click("text=/more keys of .imu./")
-    page.get_by_role("checkbox", name="g_sensitivity").click()
+    field = page.get_by_label("g_sensitivity", exact=True).first
+    field.fill("true")
+    field.press("Tab")
     click("text=/.item. the instrument/")
     for name, value in (("maker", "Xsens"), ("model", "MTi"), ("serial", "7")):
         field = page.get_by_label(name, exact=True)

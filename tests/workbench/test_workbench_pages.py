@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import tomllib
 
 import pytest
@@ -150,6 +151,28 @@ async def test_columns_are_chosen_added_and_taken_out(user, bench):
 
 
 @of_user
+async def test_a_guess_is_answered_by_a_choice(user, bench):
+    session = bench.sessions.begin("still")
+    noise = [0.001 * math.sin(k * k + 0.3) for k in range(120)]
+    rows = "".join(
+        f"{0.01 * k:.2f},{noise[k]:.9f},{noise[k + 40]:.9f},{noise[k + 80]:.9f}\n" for k in range(40)
+    )
+    (session.folder / "log.csv").write_text("time,gx,gy,gz\n" + rows)
+    await user.open(f"/sessions/{session.id}/recording?new=1")
+    await user.should_see("Is the gyro in", retries=60)
+    user.find(kind=ui.button, content="mdeg/s").click()
+    column_map = session.folder / "study-map.toml"
+    for _ in range(60):
+        await asyncio.sleep(0.05)
+        columns = tomllib.loads(column_map.read_text())["columns"]
+        if columns["gyro_z"]["grade"] == "certain":
+            break
+    assert {(columns[f"gyro_{axis}"]["unit"], columns[f"gyro_{axis}"]["grade"]) for axis in "xyz"} == {
+        ("mdeg/s", "certain")
+    }
+
+
+@of_user
 async def test_repeat_runs_are_looked_at_one_by_one(user, bench):
     session = bench.sessions.begin_with("five-years")
     await user.open(f"/sessions/{session.id}/recording")
@@ -211,7 +234,7 @@ async def test_advice_of_a_result_is_a_button_that_changes_the_study(user, bench
     found["status"]["message"] += "; or take `inercal calibrate strapdown`"
     job.result.write_text(json.dumps(found))
     await user.open(f"/sessions/{session.id}/result")
-    await user.should_see("ok: 33 coefficients")
+    await user.should_see("ok: 36 coefficients")
     user.find("imucal").click()
     await user.should_see("imucal.json", retries=200)
     (written,) = bench.root.glob("jobs/*/imucal.json")

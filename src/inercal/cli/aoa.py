@@ -9,21 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from inercal.cli.options import (
-    MapFile,
-    Overrides,
-    ResultOutput,
-    Span,
-    StudyFile,
-    map_in,
-    read_repeats,
-    study_in,
-    working,
-)
+from inercal.cli.options import Overrides, ResultOutput, StudyFile, study_in, working
 from inercal.cli.outcome import WHOLE, give
+from inercal.cli.records_in import MapFile, Span, map_in, read_repeats
 from inercal.cli.streaming import Every, StreamOptions, recorded, stream_study
 from inercal.foundation.errors import InputError
 from inercal.systems.aoa.estimators import Centrifugal, States, Static, Tangential
+from inercal.systems.aoa.system import SYSTEM as AOA
 
 if TYPE_CHECKING:
     from inercal.foundation.records.record import Record
@@ -151,7 +143,7 @@ def aoa(
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study, join))
     the_study, _ = study_in("aoa", study, keys, output)
     clock = time.perf_counter()
-    record = one_run(read_repeats(paths, map_file, output, span), system.ONE_RUN)
+    record = one_run(read_repeats(paths, map_file, output, span, how=AOA.guess), system.ONE_RUN)
     read_s = time.perf_counter() - clock
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
@@ -186,7 +178,7 @@ def _runs(
     output.check((*WHOLE, *SUFFIXES), (table, map_file, study))
     the_study, _ = study_in("aoa", study, keys, output)
     span.check()
-    record_map = map_in(map_file)
+    record_map = map_in(map_file, span.answers or ())
     smoothed = " smoothed" if the_study.settings.estimator.smooth or how.compare else ""
     with compiling(f"aoa{smoothed}", output.say):
         system.prepare(the_study, how.compare)

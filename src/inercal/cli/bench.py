@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_INTERRUPTED, abandon_output
-from inercal.cli.options import MapFile, OutputOptions, Overrides, StoreOption, StudyFile, map_in
+from inercal.cli.options import OutputOptions, Overrides, StoreOption, StudyFile
 from inercal.cli.outcome import timed
+from inercal.cli.records_in import MapFile, map_in
 from inercal.cli.streaming import Every, StreamOptions, interval_of, settle_lines
 from inercal.foundation.errors import InercalError, InputError
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,51 +13,80 @@ from cyclopts import Parameter
 from inercal.cli import EXIT_BAD_VERDICT, command_line
 from inercal.cli.options import (
     ClusterOption,
-    MapFile,
     OutputOptions,
     Overrides,
     ResultOutput,
-    RunFiles,
-    Span,
     StoreOption,
     StudyFile,
     WorkersOption,
     count_of,
-    read_record,
-    read_repeats,
     reading,
     study_in,
     working,
 )
 from inercal.cli.outcome import WHOLE, emit, give
+from inercal.cli.records_in import MapFile, RunFiles, Span, read_record, read_repeats
 from inercal.cli.streaming import Every, StreamedFiles, StreamOptions, recorded, stream_study
 from inercal.foundation.errors import InputError
 from inercal.systems.selfcal.estimators import FilterKind
 
 if TYPE_CHECKING:
+    from inercal.faces.python.study import Study
     from inercal.foundation.records.record import Record
 
 
-def _calibrating(kind: str) -> Callable[..., int]:
-    """The command that calibrates by a study of a kind."""
-
-    def command(
-        files: RunFiles,
-        /,
-        *,
-        study: StudyFile,
-        map_file: MapFile = None,
-        span: Span = Span(),
-        overrides: Overrides = None,
-        output: ResultOutput = ResultOutput(),
-    ) -> int:
-        return _calibrated(kind, files, study, map_file, span, overrides, output)
-
-    return command
+Latitude = Annotated[
+    str | None, Parameter(help='Latitude of the site, in the place of that of the study: "48 deg".')
+]
 
 
-calibrate_imu = _calibrating("imu")
-calibrate_turntable = _calibrating("turntable")
+def calibrate_imu(
+    files: RunFiles,
+    /,
+    *,
+    study: Annotated[
+        Path | None,
+        Parameter(help="Study file (TOML); `inercal new` writes one."),
+    ] = None,
+    map_file: MapFile = None,
+    latitude: Latitude = None,
+    span: Span = Span(),
+    overrides: Overrides = None,
+    output: ResultOutput = ResultOutput(),
+) -> int:
+    """Calibrate an IMU turned by hand, set on its sides, or on a table."""
+    keys = _with_latitude(overrides, latitude)
+    if study is not None:
+        return _calibrated("imu", files, study, map_file, span, keys, output)
+    from inercal.faces.python.beginning import study_for
+
+    output.check(WHOLE, (*files, map_file))
+    if not any(key.strip().startswith("site.") for key in keys):
+        raise InputError("--latitude", 'missing, expected it where there is no --study, such as "48 deg"')
+    clock = time.perf_counter()
+    records = read_repeats(files, map_file, output, span, counted=True)
+    the_study, told = study_for("imu", records, keys)
+    if not the_study.system.counted(the_study.settings):
+        records = read_repeats(files, map_file, replace(output, quiet=True), span)
+    read_s = time.perf_counter() - clock
+    output.say(f"study: {told}; `inercal new imu` writes one to change")
+    return _solved(the_study, records, output, read_s)
+
+
+def calibrate_turntable(
+    files: RunFiles,
+    /,
+    *,
+    study: StudyFile,
+    map_file: MapFile = None,
+    latitude: Latitude = None,
+    span: Span = Span(),
+    overrides: Overrides = None,
+    output: ResultOutput = ResultOutput(),
+) -> int:
+    """Calibrate an instrument at the positions of a table."""
+    keys = _with_latitude(overrides, latitude)
+    return _calibrated("turntable", files, study, map_file, span, keys, output)
 
 
 def calibrate_strapdown(
@@ -77,13 +105,17 @@ def calibrate_strapdown(
         ),
     ] = False,
     map_file: MapFile = None,
+    latitude: Latitude = None,
     span: Span = Span(),
     overrides: Overrides = None,
     streaming: StreamOptions = StreamOptions(),
     output: ResultOutput = ResultOutput(),
 ) -> int:
     """Calibrate a strapdown unit from rests and coarse turns."""
-    keys = [*(overrides or ()), *([f"strapdown.filter={estimator}"] if estimator is not None else [])]
+    keys = [
+        *_with_latitude(overrides, latitude),
+        *([f"strapdown.filter={estimator}"] if estimator is not None else []),
+    ]
     if stream:
         if estimator == "batch":
             raise InputError(
@@ -112,16 +144,26 @@ def _calibrated(
     if system.sections is not None:  # the table of sections is no recording, though `*.csv` takes it in
         tables = {path.resolve() for path in the_study.files} - {study.resolve()}
         files = [file for file in files if file.resolve() not in tables]
-    records = read_repeats(files, map_file, output, span, system.counted(the_study.settings))
-    read_s = time.perf_counter() - clock
+    records = read_repeats(files, map_file, output, span, system.counted(the_study.settings), system.guess)
+    return _solved(the_study, records, output, time.perf_counter() - clock)
+
+
+def _solved(study: Study, records: list[Record], output: ResultOutput, read_s: float) -> int:
+    """Calibrate by a study from records, which took ``read_s`` [s] to read, and hand over."""
+    system = study.system
     if system.prepare:
         from inercal.foundation._jit import compiling
 
-        with compiling(kind, output.say):
-            system.prepare(the_study, False)
+        with compiling(study.kind, output.say):
+            system.prepare(study, False)
     with working(output) as progress:
-        result = system.calibrate(records, the_study, False, progress)
+        result = system.calibrate(records, study, False, progress)
     return give(result, output, read_s)
+
+
+def _with_latitude(overrides: list[str] | None, latitude: str | None) -> list[str]:
+    """The keys that are set, the latitude of the site among them where it is given."""
+    return [*(overrides or ()), *([] if latitude is None else [f"site.latitude={latitude}"])]
 
 
 def temperature(
@@ -209,7 +251,7 @@ def selfcal(
     output.check((*WHOLE, *SUFFIXES), (*paths, map_file, study))
     of, _ = study_in("selfcal", study, keys, output)
     clock = time.perf_counter()
-    records = read_repeats(paths, map_file, output, span)
+    records = read_repeats(paths, map_file, output, span, how=of.system.guess)
     read_s = time.perf_counter() - clock
     if len(records) > 1 and compare:
         raise InputError("--compare", f"found {len(records)} runs, expected one")

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from inercal.systems.turntable.settings import TurntableSettings
 
 
+_ANYWHERE = "45 deg"
+"""Latitude of a table of sections without a study."""
+
+
 def design_positions(
     study: Study,
     /,
@@ -148,6 +152,25 @@ def design_aoa(
     return give(compared, output, read_s, "layouts")
 
 
+def design_sections(
+    study: Study,
+    /,
+    *,
+    overrides: Overrides = None,
+    output: ResultOutput = ResultOutput(),
+) -> int:
+    """Say what sections of an IMU tell, and which one more would help most."""
+    from inercal.systems.imu import verbs as system
+
+    output.check(WHOLE, (study,))
+    if study.suffix.lower() == ".csv":  # what sections tell hardly depends on the place
+        overrides = [f"site.latitude={_ANYWHERE}", *(overrides or ())]
+    the_study, read_s = study_in("imu", study, overrides, output)
+    with working(output):
+        designed = system.design(the_study)
+    return give(designed, output, read_s, "sections")
+
+
 def _positions(positions: Iterable[Iterable[float]], settings: TurntableSettings) -> str:
     """Positions as a CSV table."""
     head = ",".join(f"{joint} [deg]" for joint in settings.chain.joints)
@@ -189,7 +212,7 @@ def sensitivity(
         output.say(analysed.note)
 
     def maps(path: Path) -> None:
-        from inercal.systems.turntable.sensitivity.maps import write_maps
+        from inercal.systems.turntable.sensitivity_maps import write_maps
 
         write_maps(analysed, path)
 

@@ -25,19 +25,7 @@ if TYPE_CHECKING:
     from inercal.faces.python.study import Study as StudyOfFile
     from inercal.foundation.computing.executors import Executor
     from inercal.foundation.findings import Finding
-    from inercal.foundation.records.maps import RecordMap
-    from inercal.foundation.records.record import Record
 
-Files = Annotated[
-    list[Path], Parameter(help="Recordings; several files with distinct channels are one record.")
-]
-RUN_FILES = Parameter(
-    help="Recordings; files with distinct channels are one record, with the same ones repeat runs."
-)
-RunFiles = Annotated[list[Path], RUN_FILES]
-MapFile = Annotated[
-    Path | None, Parameter(name="--map", help="Column map (TOML) for files without canonical headers.")
-]
 StudyFile = Annotated[Path, Parameter(name="--study", help="Study file (TOML); `inercal new` writes one.")]
 Study = Annotated[Path, Parameter(help="Study file (TOML); `inercal new` writes one.")]
 Overrides = Annotated[
@@ -179,94 +167,6 @@ class ResultOutput(ReportOutput):
         for option, text in (("--store", self.store), ("--instrument", self.instrument)):
             if text is not None:
                 raise InputError(option, "found without --keep, expected with it")
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Span:
-    """The options of a command that reads a recording: which part of it."""
-
-    begin: Annotated[
-        str | None, Parameter(help='Leave out what comes before, such as "10 s" after the first stamp.')
-    ] = None
-    end: Annotated[
-        str | None, Parameter(help='Leave out what comes after, such as "30 min" after the first stamp.')
-    ] = None
-
-    def check(self) -> None:
-        """Refuse a time that is none, before anything is read; raises `InputError`."""
-        from inercal.foundation.records.record import seconds
-
-        for option, text in self.given.items():
-            seconds(text, option)
-
-    @property
-    def given(self) -> dict[str, str]:
-        """The options that were given."""
-        both = {"--begin": self.begin, "--end": self.end}
-        return {option: text for option, text in both.items() if text is not None}
-
-    def of(self, record: Record) -> Record:
-        """The part of a record; raises `InputError`, naming the options, where nothing lies within."""
-        try:
-            return record.between(self.begin, self.end)
-        except InputError as error:
-            raise InputError(", ".join(self.given), error.message) from error
-
-    def refuse(self, beside: str) -> None:
-        """Refuse the options where there is no recording to take a part of; raises `InputError`."""
-        for option in self.given:
-            raise InputError(option, f"found with {beside}, expected a recording")
-
-
-def read_record(
-    files: Sequence[Path], map_file: Path | None, output: FileOutput, span: Span = Span()
-) -> Record:
-    """Read recordings, with a progress bar where it takes long, and take the part that is asked for."""
-    from inercal.foundation.records.read import read
-
-    return _read(lambda *given: [read(*given)], files, map_file, output, span)[0]
-
-
-def read_repeats(
-    files: Sequence[Path],
-    map_file: Path | None,
-    output: FileOutput,
-    span: Span = Span(),
-    counted: bool = False,
-) -> list[Record]:
-    """As `read_record`, but files with the same channels are the records of repeat runs.
-
-    ``counted``: rows need no times, as means of poses.
-    """
-    from inercal.foundation.records.read import read_runs
-
-    return _read(partial(read_runs, counted=counted), files, map_file, output, span)
-
-
-def _read(
-    read: Callable[..., list[Record]],
-    files: Sequence[Path],
-    map_file: Path | None,
-    output: FileOutput,
-    span: Span,
-) -> list[Record]:
-    """Records by one of the readers, and the part of each that is asked for."""
-    span.check()
-    record_map = map_in(map_file)
-    with reading(output) as progress:
-        records = read(files, record_map, progress)
-    output.spare(source.path for record in records for source in record.sources)
-    return [span.of(record) for record in records]
-
-
-def map_in(map_file: Path | None) -> RecordMap | None:
-    """The column map of a file that was named, None without one; raises `inercal.foundation.errors.MapError`."""
-    if map_file is None:
-        return None
-    from inercal.foundation.records.maps import read_map  # brings a checker of files that is slow to load
-
-    return read_map(map_file)
 
 
 def study_in(

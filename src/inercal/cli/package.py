@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from inercal.cli import process_age, show
 from inercal.cli.options import FileOutput, Overrides, ResultOutput, reading
 from inercal.cli.outcome import WHOLE, hand_over, tell
+from inercal.cli.records_in import Answers
 from inercal.foundation.errors import InputError
 
 Rate = Annotated[
@@ -29,10 +30,11 @@ def _beginning(kind: str) -> Callable[..., None]:
         /,
         *,
         rate: Rate = None,
+        answers: Answers = None,
         overrides: Overrides = None,
         output: FileOutput = FileOutput(),
     ) -> None:
-        _new(kind, files or [], overrides or [], output, rate)
+        _new(kind, files or [], overrides or [], output, rate, answers or ())
 
     return command
 
@@ -62,12 +64,19 @@ def new_lab(
     tell(output, "new lab", words, {"lab": str(path)})
 
 
-def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput, rate: str | None) -> None:
+def _new(
+    kind: str,
+    files: list[Path],
+    overrides: list[str],
+    output: FileOutput,
+    rate: str | None,
+    answered: Sequence[str],
+) -> None:
     """Write a study of that kind, and the map if there is one; nothing is overwritten."""
-    from inercal.faces.python.beginning import begun, mapped, sections_of
+    from inercal.faces.python.beginning import asked_in, begun, mapped, sections_of
     from inercal.faces.studies.starting import UNKNOWN
     from inercal.foundation._files import write_text
-    from inercal.foundation.records.guess import of_means
+    from inercal.foundation.records.maps import answers_of
     from inercal.foundation.records.read import source_of
     from inercal.foundation.units import parse_quantity
 
@@ -77,9 +86,12 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
             raise InputError("--rate", f"found {rate}, expected a rate above 0")
         if not files:
             raise InputError("--rate", "found without a recording, expected one for the map")
+    answers = answers_of(answered)
+    if answers and not files:
+        raise InputError("--answer", "found without a recording, expected one for the map")
     study = output.out or Path(f"{kind}.toml")
     beside = study.with_name(f"{study.stem}-map{study.suffix}")
-    text, column_map = begun(kind, files, study, beside, rate, overrides)
+    text, column_map = begun(kind, files, study, beside, rate, overrides, answers)
     map_file = None if column_map is None else beside
     stated = any(override.strip().startswith(("imu.method", "imu.section")) for override in overrides)
     told = None if stated else sections_of(kind, files, column_map)
@@ -87,8 +99,7 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
     asked = () if told is None else told[1]
     if table is not None:
         keys = ['imu.method="sections"', f"imu.sections={table}", *overrides]
-        text, _ = begun(kind, files, study, beside, rate, keys)
-        column_map = None if column_map is None else of_means(column_map)
+        text, _ = begun(kind, files, study, beside, rate, keys, answers)
     contents = {study: text}
     if map_file is not None and column_map is not None:
         contents[map_file] = column_map
@@ -107,6 +118,7 @@ def _new(kind: str, files: list[Path], overrides: list[str], output: FileOutput,
         words = words.replace("look it over and correct it", f'fill in each "{UNKNOWN}" and look it over', 1)
     if column_map is not None and not mapped(column_map):
         words += "\nno accelerometer or gyro was recognised: the map lists the columns, give them channels and units"
+    words = "\n".join([words, *([] if column_map is None else asked_in(column_map))])
     words = "\n".join([words, *(question.line for question in asked)])
     tell(output, f"new {kind}", words, result, map(source_of, files), findings=asked)
 

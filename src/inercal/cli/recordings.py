@@ -6,17 +6,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from inercal.cli.options import (
-    Files,
-    MapFile,
-    OutputOptions,
-    ReportOutput,
-    ResultOutput,
-    Span,
-    read_record,
-    working,
-)
+from inercal.cli.options import OutputOptions, ReportOutput, ResultOutput, working
 from inercal.cli.outcome import WHOLE, emit, give, timed
+from inercal.cli.records_in import Files, MapFile, Span, read_record
 from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
 
 
@@ -42,7 +34,7 @@ def inspect(
     from inercal.foundation.results.result import without_coefficients
 
     output.check(WHOLE, (*files, map_file))
-    record = read_record(files, map_file, output, span)
+    record = read_record(files, map_file, output, span, with_guess=True)
     if {"wc_x", "th_x", "acc_x"} <= record.columns.keys():  # a platform in gimbals
         from inercal.systems.selfcal.reading import worth_saying
 
@@ -51,6 +43,7 @@ def inspect(
     result = {
         "channels": [vars(row) for row in summary(record)],
         "norms": [vars(row) for row in norms(record)],
+        "taken": dict(record.taken),
     }
     estimate = timed(without_coefficients("inspect", words, result, record.sources, record.findings))
     if output.out is not None:
@@ -59,8 +52,10 @@ def inspect(
     if output.report is not None:
         write_text(output.report, render_inspection(record, estimate, inspection_pictures(record)))
         output.say(f"report: {output.report}")
+    taken = [f"{sensor}: {of_sensor}" for sensor, of_sensor in record.taken.items()]
     findings = [finding.line for finding in record.findings] or [words]
-    emit(estimate, "\n".join([channels_table(record).text(), "", *findings]), output)
+    text = "\n".join([channels_table(record).text(), "", *(taken if map_file is not None else ()), *findings])
+    emit(estimate, text, output)
 
 
 def allan(

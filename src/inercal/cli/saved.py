@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Parameter
 
 from inercal.cli import EXIT_BAD_VERDICT
-from inercal.cli.options import FileOutput, MapFile, ResultOutput, Span, read_record, reading
+from inercal.cli.options import FileOutput, ResultOutput, reading
 from inercal.cli.outcome import WHOLE, emit, give, say_findings, tell
+from inercal.cli.records_in import MapFile, Span, read_record
 from inercal.cli.streaming import StreamOptions, recorded, run_stream, streamed
 from inercal.foundation.errors import InputError
 

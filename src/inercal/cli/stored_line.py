@@ -41,7 +41,19 @@ OPTIONS_AGAIN: Mapping[str, Use] = {
     **dict.fromkeys(("FILES", "STUDY", "FIRST", "SECOND", "OF"), "file"),
     **dict.fromkeys(("--study", "--map", "--join", "--runs", "--tolerance"), "file"),
     **dict.fromkeys(
-        ("--set", "--begin", "--end", "--at", "--order", "--filter", "--compare", "--states"), "value"
+        (
+            "--set",
+            "--begin",
+            "--end",
+            "--answer",
+            "--latitude",
+            "--at",
+            "--order",
+            "--filter",
+            "--compare",
+            "--states",
+        ),
+        "value",
     ),
     **dict.fromkeys(("--static", "--centrifugal", "--tangential", "--smooth", "--points"), "value"),
     **dict.fromkeys(("--seed", "--coefficient", "--until", "simulate selfcal --runs"), "value"),

@@ -16,16 +16,14 @@ from cyclopts import Parameter
 
 from inercal.cli import abandon_output
 from inercal.cli.options import (
-    RUN_FILES,
     CheckpointOption,
     FileOutput,
     OutputOptions,
     ReportOutput,
     ResultOutput,
-    Span,
-    map_in,
     whole_number,
 )
+from inercal.cli.records_in import RUN_FILES, Span, map_in
 from inercal.foundation.errors import InputError, RecordError, UsageError
 
 if TYPE_CHECKING:

@@ -73,7 +73,7 @@ COMMANDS = {
         "Calibrate an IMU held by hand, set on its sides and turned, or turned by a table.\n\nGives bias, scale factor "
         "and misalignment of the accelerometers, and of the gyro if there is one, with uncertainties; of repeat runs "
         "the combined values; of the methods known_rates and known_turns FILEs are in order, one "
-        "for each rate or turn. "
+        "for each rate or turn. Without --study the recording tells the method, and --latitude the site. "
         "--out saves them (.json or .toml), --report writes a page to hand over. Exit code 1: done, but the verdict is "
         "not ok.",
         "inercal calibrate imu log.csv --study imu.toml --report cal.html",
@@ -163,6 +163,12 @@ COMMANDS = {
         "(.toml) or the whole result (.json), --report a page with pictures.",
         "inercal design strapdown unit.toml --out plan.toml",
     ),
+    ("design", "sections"): (
+        "inercal.cli.design:design_sections",
+        "Say what sections of an IMU tell before a test, and which one more would help most.\n\nThe STUDY states the "
+        "sections, or is a table of them (.csv). --out writes the result (.json or .toml), --report a page.",
+        "inercal design sections sections.csv",
+    ),
     ("design", "aoa"): (
         "inercal.cli.design:design_aoa",
         "Say what the sensors of a wind-tunnel model can tell of its angle, beside other layouts, and how good they "
@@ -180,10 +186,8 @@ COMMANDS = {
     ),
     ("simulate", "imu"): (
         "inercal.cli.simulate:simulate_imu",
-        "Simulate an IMU that is held by hand in many poses, as the method multiposition calibrates it.\n\nThe study "
-        "states poses, noise and true coefficients under [simulation] (coefficients that are absent are drawn, as of a "
-        "consumer-grade unit with outputs in counts), and under [disturbances] what real recordings add. The recording "
-        "goes to --out (.csv, .npz, .h5, .parquet or .nc).",
+        "Simulate an IMU in its sections, one after the other, or held by hand in many poses.\n\nThe study states true "
+        "coefficients under [simulation], or they are drawn. The recording goes to --out (.csv, .npz, .h5, .nc, ...).",
         "inercal simulate imu imu.toml --seed 1 --out log.csv",
     ),
     ("simulate", "strapdown"): (

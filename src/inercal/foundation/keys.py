@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict, Unpack
 
-from inercal.foundation.units import parse_quantity
+from inercal.foundation.errors import InputError
+from inercal.foundation.units import parse_quantity, shown
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,20 @@ class Reading:
     schema: Mapping[str, Any]
 
 
+def _typed(typed: Any) -> Any:
+    """A text or a number as it is."""
+    if not isinstance(typed, str | int | float):
+        raise InputError("", f'found {shown(typed)}, expected a quantity with its unit, such as "50 deg/h"')
+    return typed
+
+
+AS_TYPED = Reading(
+    _typed,
+    {"type": ["string", "number"], "examples": ["50 deg/h", "2 deg/h/g^2", "1.00(2)"]},
+)
+"""A quantity whose unit depends on a term and an instrument: it stays as typed until these are known."""
+
+
 @dataclass(frozen=True)
 class Key:
     """The key of a study that states a field.
@@ -82,15 +97,16 @@ class Key:
     exact, uncertain : bool
         A quantity that is refused with an uncertainty, and one that is refused without.
     least, most : float or None
-        Bounds of a plain number; ``least`` of a list is its length.
+        Bounds of a plain number; of a list or a text those of its length.
     words : mapping
-        Words that may stand in place of a quantity, and the value of the field that each is.
+        Words that may stand in place of a quantity or a table, and the value of the field that each is.
     of : str
         What the quantities of a list are for, parted by commas, where it has so many: "x, y, z".
     one : bool
         A single quantity may stand for all of such a list.
     table : bool
-        The field is settings itself, a tuple of them, or a mapping of them by names of one's own.
+        The field is settings itself, a tuple of them, or a mapping of them, or of entries by ``reads``, by names of
+        one's own.
     kinds : tuple of str
         Kinds, or methods, that heed the key; all where it is empty.
     needed : tuple of str
@@ -176,19 +192,28 @@ def quantities(
 def option(says: str, default: Any = REQUIRED, *, example: object = None, **more: Unpack[More]) -> Any:
     """A field that a study states as a plain value: a word, a number, true or false, a file, or a list of these."""
     key = Key(says, example=example, **more)
-    return dataclasses.field(default=default, metadata={"key": key})
-
-
-def table(says: str, default: Any = REQUIRED, *, example: object = None, name: str = "") -> Any:
-    """A field that a study states as a table, or as a list or table of tables: its type is a settings dataclass,
-    ``Settings | None``, ``tuple[Settings, ...]`` or ``Mapping[str, Settings]``.
-
-    Keys that are absent there are those of the ``default``.
-    """
-    key = Key(says, example=example, name=name, table=True)
     if isinstance(default, Mapping):
         return dataclasses.field(default_factory=dict, metadata={"key": key})
     return dataclasses.field(default=default, metadata={"key": key})
+
+
+def table(says: str, default: Any = REQUIRED, *, example: object = None, **more: Unpack[More]) -> Any:
+    """A field that a study states as a table, or as a list or table of tables: its type is a settings dataclass,
+    ``Settings | None``, ``tuple[Settings, ...]`` or ``Mapping[str, Settings]``.
+
+    Keys that are absent there are those of the ``default``; ``example`` and ``more`` are those of `Key`.
+    """
+    key = Key(says, example=example, table=True, **more)
+    if isinstance(default, Mapping):
+        return dataclasses.field(default_factory=dict, metadata={"key": key})
+    return dataclasses.field(default=default, metadata={"key": key})
+
+
+def keyed(name: str, fields: Mapping[str, tuple[Any, Any]]) -> Any:
+    """A base for settings whose keys are names of a table: name of the field -> its type, and the field."""
+    return dataclasses.make_dataclass(
+        name, [(key, hint, field) for key, (hint, field) in fields.items()], frozen=True
+    )
 
 
 def keys_of(settings: type) -> Iterator[tuple[dataclasses.Field[Any], Key]]:
@@ -211,6 +236,11 @@ GONE: Mapping[tuple[str, str], str] = {
     **dict.fromkeys([("filter.kind", "linear"), ("filter", "linear")], "error-state"),
     **dict.fromkeys([("filter.kind", "lm"), ("filter", "lm")], "map"),
     ("imu.bias_drift", ""): "nothing: moves have the bias of the rests beside them, and a drift is named",
+    ("budget", "turn angle"): "angles and rates",
+    ("budget", "alignment"): "placing or axes",
+    ("budget", "time base"): "clock",
+    ("budget", "horizontal earth rate"): "earth rate, level part",
+    ("budget", "vertical earth rate"): "earth rate",
 }  # fmt: skip
 """Choices that versions up to 0.2.0 had, by key, its last word or option, and choice, empty for the key itself: what to
 use in their place."""

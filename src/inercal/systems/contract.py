@@ -96,7 +96,7 @@ class System:
     complete: Callable[[Channels], bool] = lambda channels: False
     """True where canonical channels need no map."""
     guess: Mapping[str, Any] = field(default_factory=dict)
-    """Options of `inercal.foundation.records.guess.guess_map`."""
+    """Options of `inercal.foundation.records.recognise.map_text.guess_map`."""
     counted: Callable[[Any], bool] = lambda settings: False
     """True of settings for which rows of a file need no times."""
 

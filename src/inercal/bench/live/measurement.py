@@ -341,6 +341,7 @@ def measure(
         from inercal.foundation.records.maps import read_map
 
         record_map = read_map(map)
+        record_map.refuse_guess()
     if not every >= 0.0:
         raise InputError("every", f"found {every}, expected a time from 0 on")
 

@@ -116,7 +116,7 @@ class Bench:
 
     def begin_map(self, session: Session) -> None:
         """Write a guessed map for the recordings of a session; raises `InputError` where they cannot be read."""
-        from inercal.foundation.records.guess import guess_map
+        from inercal.foundation.records.recognise.map_text import guess_map
 
         put(session, MAP, guess_map(session.recordings, **SYSTEMS[session.kind].guess))
 

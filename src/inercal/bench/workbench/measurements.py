@@ -260,6 +260,8 @@ def _prepared(session: Session, wish: Wish) -> WishedMeasurement:
         return rest.beside(of_study(study, wish.every, say, say_finding))
 
     record_map = None if session.map is None else read_map(session.map)
+    if record_map is not None:
+        record_map.refuse_guess()
     measurement = RunningMeasurement(MeasurementPlan(source, make, record_map, recording, sinks))
     return WishedMeasurement(wish, measurement, rest, _command(session, wish, sinks, recording), recording)
 

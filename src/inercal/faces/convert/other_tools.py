@@ -59,6 +59,12 @@ def to_tool(estimate: Estimate, name: str, where: object = "calibration") -> Con
     Raises `InputError`: the estimate is not of an IMU, or the convention has no place for a term that matters.
     """
     convention = CONVENTIONS[name]
+    own = estimate.result.get(name)
+    if isinstance(own, Mapping):
+        made = [
+            float(own.get(term, value)) for term, value in zip(estimate.names, estimate.values, strict=True)
+        ]
+        estimate = replace(estimate, values=np.array(made))
 
     def model_at(values: Array) -> ImuModel:
         model = imu_model(replace(estimate, values=values), where)

@@ -23,8 +23,7 @@ from inercal.faces.convert.correction import Correction, Samples, factor_of, one
 from inercal.foundation.arrays import Array
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
-from inercal.foundation.instruments.by_angle import channel_model
-from inercal.foundation.instruments.polynomial import ChannelModel, Monomial
+from inercal.foundation.instruments.by_angle import ChannelModel, Monomial, channel_model
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import Unit, parse_unit
 

@@ -10,8 +10,7 @@ from inercal.faces.convert.correction import range_of
 from inercal.faces.convert.table import TableInstrument
 from inercal.foundation.errors import InputError
 from inercal.foundation.findings import Finding
-from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
-from inercal.foundation.instruments.polynomial import Monomial
+from inercal.foundation.instruments.by_angle import CHANNELS, Monomial, channel_model
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
 

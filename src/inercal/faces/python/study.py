@@ -178,8 +178,10 @@ def _of_keys(kind: str, keys: Mapping[str, Any]) -> Any:
 def _in_tables(kind: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """The keywords with those in their tables that stand alone."""
     tables: dict[str, Any] = {}
+    whole = SYSTEMS[kind].study_file().model_fields
     for key, value in keys.items():
-        table = "site" if key in _SITE else "" if isinstance(value, Mapping) else SYSTEMS[kind].table
+        of_file = isinstance(value, Mapping) and (key in whole or not SYSTEMS[kind].table)
+        table = "site" if key in _SITE else "" if of_file else SYSTEMS[kind].table
         if not table or key == "schema":
             tables[key] = {**tables.get(key, {}), **value} if isinstance(value, Mapping) else value
             continue
@@ -249,7 +251,7 @@ def of_runs(
     if len(calibrated) == 1:
         return one(calibrated[0])
     runs = [calibration.estimate for calibration in calibrated]
-    estimate = with_span(combine_runs(runs), records[0])
+    estimate = with_reading(combine_runs(runs), records[0])
     shown = shown_of(estimate, calibrated[0])
 
     def page() -> str:
@@ -302,17 +304,16 @@ def _traced(calibration: Any, record: Record, study: Study) -> Any:
     """The calibration, its estimate with the span of the record and with the study among its inputs."""
     from inercal.foundation.records.read import source_of
 
-    estimate = with_span(calibration.estimate, record)
+    estimate = with_reading(calibration.estimate, record)
     return replace(
         calibration, estimate=replace(estimate, inputs=(*estimate.inputs, *map(source_of, study.files)))
     )
 
 
-def with_span(estimate: Estimate, record: Record) -> Estimate:
-    """The estimate, saying what part of the recording it is of."""
-    if not record.span:
-        return estimate
-    return replace(estimate, provenance={**estimate.provenance, "span": dict(record.span)})
+def with_reading(estimate: Estimate, record: Record) -> Estimate:
+    """The estimate, saying what part of the recording it is of, and what its columns were taken for."""
+    said = {key: dict(value) for key, value in (("span", record.span), ("taken", record.taken)) if value}
+    return replace(estimate, provenance={**estimate.provenance, **said}) if said else estimate
 
 
 PLANNED = tuple(kind for kind, system in SYSTEMS.items() if system.foresight)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,7 @@ import numpy as np
 
 from inercal.faces.python.calibrations import estimate_of
 from inercal.faces.python.result import Result, View
-from inercal.faces.python.study import Study, study, study_of
+from inercal.faces.python.study import Study, study, study_of, with_reading
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate, timed
@@ -42,11 +43,9 @@ def calibrate(
         One run; several are repeat runs of an IMU, a strapdown unit, a table or a platform, which are combined, or of
         the methods ``known_rates`` and ``known_turns`` of an IMU one for each rate or turn, in order.
     study : Study or path, optional
-        Needed for all but an IMU; of that, ``latitude`` (and ``height``) or
-        ``gravity`` can take its place: texts with a unit, ``"48 deg"``, ``"9.81744(2) m/s^2"``.
+        Of an IMU ``latitude`` (and ``height``) or ``gravity`` can take its place: ``"48 deg"``, ``"9.81744(2) m/s^2"``.
     method : str, optional
-        Of an IMU without a study: ``"multiposition"``, ``"ferraris"``, ``"aided"`` or ``"means"``; absent,
-        ``"ferraris"`` of a record with labelled sections, else ``"multiposition"``.
+        Of an IMU without a study; absent, ``"ferraris"`` of labelled sections, else ``"multiposition"``.
     compare : bool
         Also run the other estimators of a platform, or the other methods of an angle of attack.
     progress : callable
@@ -93,7 +92,8 @@ def calibrate(
         raise InputError("compare", f"found with a study of kind {study.kind}, expected one of {expected}")
     if system.prepare:
         system.prepare(study, compare)
-    return system.calibrate(runs, study, compare, progress)
+    with _one_thread():
+        return system.calibrate(runs, study, compare, progress)
 
 
 def runs(
@@ -149,7 +149,18 @@ def runs(
         )
     if system.prepare:
         system.prepare(given, compare)
-    return system.runs(table, given, lambda path: read(path, map), compare, progress)
+    with _one_thread():
+        return system.runs(table, given, lambda path: read(path, map), compare, progress)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Linear algebra by one thread: of the small matrices here, two take up to twenty times the time of one."""
+    import scipy.linalg  # noqa: F401  its library of its own has to be there before it is told
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def _imu_study(record: Record, given: dict[str, str]) -> Study:
@@ -197,20 +208,22 @@ def simulate(study: Study | str | Path, rng: np.random.Generator) -> Record:
 
 def design(study: Study | str | Path, what: str | None = None) -> Result:
     """Find the positions or tolerances of a turntable, the path of a platform, or the turns of a strapdown unit, that
-    tell most; of a model, say what its sensors can tell, beside the other layouts that the study states.
+    tell most; of a model, say what its sensors can tell, beside the other layouts that the study states; of an IMU,
+    what its sections tell, and which one more would help most.
 
     Parameters
     ----------
     study : Study or path
     what : str, optional
         ``"positions"`` or ``"tolerances"`` of a turntable, ``"selfcal"`` of a platform, ``"strapdown"`` of a strapdown
-        unit, ``"aoa"`` of a model, as the commands name it; if absent, by the kind, positions.
+        unit, ``"aoa"`` of a model, ``"sections"`` of an IMU, as the commands name it; if absent, by the kind,
+        positions.
 
     Returns
     -------
     Result
         Without coefficients: ``table()`` compares with plans of the field, ``evidence.plan`` is the best plan; of a
-        model ``evidence.bounds`` are those of the layouts.
+        model ``evidence.bounds`` are those of the layouts, of an IMU ``evidence.foretold`` is what the sections tell.
 
     Raises
     ------
@@ -325,7 +338,10 @@ def temperature(
         ]
         clock = time.perf_counter()
         model = fit_calibrations(estimates, sources, about, order)
-    return of_temperature(replace(model, estimate=timed(model.estimate, clock)))
+    estimate = timed(model.estimate, clock)
+    if isinstance(given, Record):
+        estimate = with_reading(estimate, given)
+    return of_temperature(replace(model, estimate=estimate))
 
 
 def allan(record: Record) -> Result:
@@ -375,7 +391,7 @@ def allan(record: Record) -> Result:
 
         return pictures(noise)[0]
 
-    estimate = noise.estimate
+    estimate = with_reading(noise.estimate, record)
     first = noise.channels[0]
     seen = f"N_{first.name}"
     words = f"{len(noise.channels)} channels"

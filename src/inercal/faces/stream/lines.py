@@ -21,9 +21,10 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.channels import Channel, may_be_empty
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.read.join import FileTable, check_present, conversion, row_rate
-from inercal.foundation.records.read.layout import TextLayout, comment_marks, find_layout, is_rounded
+from inercal.foundation.records.read.layout import UNENDED, TextLayout, comment_marks, find_layout, is_rounded
+from inercal.foundation.records.read.rewriting import is_rewritten
 from inercal.foundation.records.read.table import FileShare, RawTable
-from inercal.foundation.records.read.text import UNENDED, contents, locate
+from inercal.foundation.records.read.text import contents, locate
 from inercal.foundation.records.record import Record
 from inercal.foundation.records.stamps import beside
 
@@ -295,6 +296,11 @@ def _part(record_map: RecordMap | None) -> FileShare:
             f"found columns of {len(record_map.parts)} files, expected those of one for a stream",
         )
     (part,) = record_map.parts
+    if is_rewritten(part.options) or any(channel.stamps for channel in part.channels or ()):
+        raise MapError(
+            record_map.path,
+            "found lines or stamps in words, expected rows of numbers and plain times for a stream",
+        )
     if not record_map.ignore_time:
         return part
     return replace(part, channels=tuple(channel for channel in part.channels or () if channel.name != "t"))

@@ -170,7 +170,8 @@ class Selfcal(SystemOnStream[SelfcalState]):
         state = self._seen(state, sample.t, dt)
         state, over, walked = self._rate(state, sample.t, over)
         doubt, seen = walked is not None or state.doubt, bool(np.isfinite(th).all())
-        walk, later = dt if walked is None else walked, np.where(np.isfinite(following), following, over)
+        walk, behind = dt if walked is None else walked, over if self._gained.any() else np.full(3, np.nan)
+        later = np.where(np.isfinite(following), following, behind)
         step = Steps(np.array([dt]), over[None], acc[None], th[None], later[None], np.zeros(1))
         filter_, trace = advance(
             self._module,

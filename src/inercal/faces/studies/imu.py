@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from inercal.faces.studies.common import StudyFile, site_of
 from inercal.faces.studies.ferraris import FerrarisTable, ferraris_settings, seconds_of
 from inercal.faces.studies.fields import QuantityText, refusal
 from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
-from inercal.faces.studies.rig import RigTable, chain_of
-from inercal.faces.studies.tables import check_kind, settings_of, table_of
+from inercal.faces.studies.tables import Stated, check_kind, settings_of, table_of
 from inercal.foundation._toml import Strict, check
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import (
@@ -23,10 +22,12 @@ from inercal.foundation.instruments.terms import (
     GYRO_G_SENSITIVITY,
     GYRO_TRIAD,
 )
+from inercal.foundation.rigs.stated_chain import chain_of
 from inercal.foundation.units import Quantity, parse_unit, shown
 from inercal.systems.imu.settings import (
     TILT,
     TURN,
+    AidedRig,
     AidedSettings,
     Disturbances,
     Exclusion,
@@ -40,43 +41,9 @@ from inercal.systems.imu.settings import (
     mounting_of,
 )
 
-SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
-
-class AidedTable(Strict):
-    """Reference-aided calibration: the table, and the instrument on it."""
-
-    rig: RigTable = Field(
-        default=RigTable(kind="two_axis_turntable"),
-        title="Rig",
-        description="the table, as in a study of a turntable; of two axes and without errors if absent, "
-        "its azimuth unknown unless given",
-    )
-    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = Field(
-        default=("+x", "+y", "+z"),
-        examples=[["+x", "+y", "+z"]],
-        description="axes of the table, at zero angles, along which the instrument's x, y and z point",
-    )
-
-    @model_validator(mode="after")
-    def _right_handed(self) -> AidedTable:
-        """Refuse axes that make no frame."""
-        if mounting_of(self.mounting) is None:
-            raise refusal(
-                f"found the mounting {', '.join(self.mounting)}, expected three axes that make a right-handed frame"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _no_limits(self) -> AidedTable:
-        """Refuse what would change nothing."""
-        if self.rig.limits.model_fields_set:
-            raise refusal("found rig.limits, expected none: the angles are those of the record")
-        return self
-
-
-def aided_settings(table: AidedTable, where: object) -> AidedSettings:
-    """Put the table in SI.
+def aided_settings(table: AidedRig, where: object) -> AidedSettings:
+    """The table with its errors, in SI.
 
     Raises `StudyError` for an error that this kind of table does not have, or one without any distribution.
     """
@@ -93,6 +60,9 @@ _METHODS = {
     "section": ("sections",),
     "placing": ("sections",),
     "level": ("sections",),
+    "misalignment": ("sections",),
+    "mounting": ("sections",),
+    "clock": ("sections",),
     "rates": ("known_rates",),
     "turns": ("known_turns",),
     "alignment": ("known_turns",),
@@ -125,6 +95,17 @@ def exclusion_of(texts: list[str]) -> Exclusion:
     return Exclusion(times, poses)
 
 
+Prior = Annotated[
+    Any, WithJsonSchema({"type": "string", "pattern": r"^\s*0", "examples": ["0(0.05) deg/s/g"]})
+]
+"""0 with a standard uncertainty, in a unit that depends on the term."""
+
+
+def _about_zero(dimension: str, example: str) -> QuantityText:
+    """The reader of a prior: 0 with its standard uncertainty."""
+    return QuantityText(dimension, example, lambda value: value == 0.0, "0 with its standard uncertainty")
+
+
 Rate = Annotated[Quantity, QuantityText("rate", "33.333(15) rpm")]
 
 TurnAngle = Annotated[Quantity, QuantityText("angle", "361.338(5) deg", TURN.accept, TURN.words)]
@@ -147,9 +128,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         default="multiposition",
         description="multiposition: many poses held still by hand, no turntable; ferraris: six positions and three "
         "turns by a known angle; aided: on a table whose angles are in the record; sections: rests, rates and turns, "
-        "each with what is known of it; shorthands of sections are means: accelerometers, a row of mean outputs for "
-        "each rest in an unknown direction; known_rates: a gyro on a platter or rate table, in unknown orientations; "
-        "known_turns: a gyro, a turn by a known angle about each axis",
+        "each with what is known of it; shorthands of sections are ferraris, means: accelerometers, a row of mean "
+        "outputs for each rest in an unknown direction; known_rates: a gyro on a platter or rate table, in unknown "
+        "orientations; known_turns: a gyro, a turn by a known angle about each axis",
     )
     sections: Annotated[str, Field(min_length=1)] | None = Field(
         default=None,
@@ -170,6 +151,24 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     level: Annotated[Quantity, QuantityText("angle", "0.05 deg", TILT.accept, TILT.words)] | None = Field(
         default=None,
         description="of sections: the axes of turns and rates are vertical within this; not known if absent",
+    )
+    misalignment: Annotated[Quantity, _about_zero("angle", "0(50) mrad")] | None = Field(
+        default=None, description="of sections: what M and T are before the test; 0(50) mrad if absent"
+    )
+    mounting: Annotated[Quantity, _about_zero("angle", "0(0.5) deg")] | None = Field(
+        default=None,
+        description="of sections: rotation of the case against what is said of directions and axes; 0 if absent",
+    )
+    clock: Annotated[Quantity, _about_zero("number", "0(20) ppm")] | None = Field(
+        default=None,
+        description="of sections: relative error of the record's clock, in the place of time_base",
+    )
+    g_sensitivity: bool | Prior = Field(
+        default=False,
+        description="how the gyro's drift depends on specific force: true to estimate it too; of sections, where it is "
+        "estimated unless false, 0 with the standard uncertainty it has before the test, by default 0.1 deg/s/g, of "
+        "gyros for navigation 0.1 deg/h/g",
+        examples=["0(0.05) deg/s/g"],
     )
     rates: list[Rate] = Field(
         default=[],
@@ -204,7 +203,9 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
     ferraris: FerrarisTable = Field(
         default=FerrarisTable(), title="Ferraris", description="options of the method ferraris"
     )
-    aided: AidedTable = Field(default=AidedTable(), title="Aided", description="options of the method aided")
+    aided: Stated[AidedRig] = Field(
+        default=AidedRig(), title="Aided", description="options of the method aided"
+    )
 
     @model_validator(mode="after")
     def _of_the_method(self) -> ImuTable:
@@ -215,6 +216,8 @@ class ImuTable(table_of(ImuSettings)):  # type: ignore[misc]
         check_kind(ImuSettings, self, self.method, "method")
         if self.sections is not None and self.section:
             raise refusal("found beside sections, expected one of the two", "section")
+        if self.clock is not None and "time_base" in self.model_fields_set:
+            raise refusal("found beside time_base, expected one of the two", "clock")
         for key in self.model_fields_set - {"method"}:
             methods = _METHODS.get(key, ())
             if methods and self.method not in methods:
@@ -286,13 +289,18 @@ def _method(table: ImuTable, path: str | Path) -> Method | None:
                 tuple(table.section),
                 None if table.placing is None else table.placing.value,
                 None if table.level is None else table.level.value,
+                None if table.misalignment is None else table.misalignment.u,
+                0.0 if table.mounting is None else table.mounting.u,
             )
     return None
 
 
 def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
-    """True where K2 is estimated, and its standard deviation about 0 [1/(m/s^2)] where that is stated."""
+    """True where K2 is estimated without a prior, and its standard deviation about 0 [1/(m/s^2)] where that is
+    stated."""
     if isinstance(table.k2, bool):
+        if table.method == "sections":
+            return False, 0.0 if "k2" in table.model_fields_set and not table.k2 else None
         if table.k2 and table.method == "ferraris":
             raise StudyError(
                 path,
@@ -302,13 +310,32 @@ def _k2(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float 
         return table.k2, None
     if table.method == "aided":
         raise StudyError(path, "imu.k2: found an uncertainty with method = 'aided', expected true or false")
-    value, u = coefficient_of(table.k2, "K2_x", "accelerometer", parse_unit("count"), gravity, "imu.k2", path)
+    return False, _u_about_zero(table.k2, "K2_x", "imu.k2", "0(50) ug/g^2", gravity, path)
+
+
+def _g_sensitivity(table: ImuTable, gravity: float, path: str | Path) -> tuple[bool, float | None]:
+    """True where it is estimated without a prior, and of sections its standard deviation about 0
+    [(rad/s)/(m/s^2)] where that is stated, 0 where there is none."""
+    if isinstance(table.g_sensitivity, bool):
+        unsaid = table.g_sensitivity or "g_sensitivity" not in table.model_fields_set
+        return table.g_sensitivity, None if unsaid else 0.0
+    if table.method != "sections":
+        found = f"imu.g_sensitivity: found {shown(table.g_sensitivity)}"
+        raise StudyError(path, f"{found}, expected true or false with method = {table.method!r}")
+    key, example = "imu.g_sensitivity", "0(0.05) deg/s/g"
+    return True, _u_about_zero(table.g_sensitivity, "G_xx", key, example, gravity, path)
+
+
+def _u_about_zero(
+    text: object, symbol: str, key: str, example: str, gravity: float, path: str | Path
+) -> float:
+    """Standard deviation [SI] of a term about 0."""
+    kind, unit = ("accelerometer", "count") if symbol.startswith("K") else ("gyro", "rad/s")
+    value, u = coefficient_of(text, symbol, kind, parse_unit(unit), gravity, key, path)
     if value != 0.0:
-        raise StudyError(
-            path,
-            f'imu.k2: found {shown(table.k2)}, expected true or 0 with an uncertainty, such as "0(50) ug/g^2"',
-        )
-    return False, u
+        expected = f'expected true, false or 0 with an uncertainty, such as "{example}"'
+        raise StudyError(path, f"{key}: found {shown(text)}, {expected}")
+    return u
 
 
 def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
@@ -335,11 +362,16 @@ def imu_study(data: Mapping[str, Any], path: str | Path) -> ImuSettings:
             other.k2, "K2_x", "accelerometer", count, site.gravity, "disturbances.k2", path
         )
     fitted, k2_u = _k2(file.imu, site.gravity, path)
+    with_g, g_u = _g_sensitivity(file.imu, site.gravity, path)
+    of_clock = {} if file.imu.clock is None else {"time_base_u": file.imu.clock.u}
     return settings_of(
         ImuSettings,
         file.imu,
         k2=fitted,
         k2_u=k2_u,
+        g_sensitivity=with_g,
+        g_sensitivity_u=g_u,
+        **of_clock,
         site=site,
         simulation=settings_of(Simulation, file.simulation, coefficients=truth),
         disturbances=settings_of(Disturbances, other, k2=k2),

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from pydantic import Field, WithJsonSchema
+from pydantic import WithJsonSchema
 
-from inercal.faces.studies.tables import settings_of, table_of
+from inercal.faces.studies.tables import settings_of
 from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
 from inercal.foundation.instruments.terms import TERMS
@@ -34,28 +34,6 @@ RATE_TERMS = tuple(f"{symbol}_{axis}" for axis in "xyz" for symbol in ("S_asym",
 _USUAL_UNIT = {"gyrowheel": "rad/s", "gyro": "rad/s", "accelerometer": "m/s^2"}
 
 
-class InstrumentTable(table_of(Instrument)):  # type: ignore[misc]
-    """The instrument on the table."""
-
-    unit: str | None = Field(
-        default=None,
-        description="of its outputs where no record says it; that of the noise, rad/s or m/s^2 if absent",
-        examples=["deg/h"],
-    )
-    terms: list[str] | None = Field(
-        default=None, min_length=1, description="terms to estimate; those usual for the kind if absent"
-    )
-    coefficients: dict[str, Typed] = Field(
-        default_factory=dict,
-        description="values of terms by symbol: true ones to simulate, stated ones where a term is not fitted",
-    )
-    noise: str | None = Field(
-        default=None,
-        description="standard deviation of a reading, or random walk; from the scatter if absent",
-        examples=["0.01 deg/h", "0.001 deg/sqrt(h)"],
-    )
-
-
 @dataclass(frozen=True)
 class _Form:
     """Unit of a term as a fraction: dimension above the bar, power and dimension below it."""
@@ -65,7 +43,7 @@ class _Form:
     power: int = 0
 
 
-def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Instrument:
+def instrument_of(table: Any, gravity: float, where: object) -> Instrument:
     """The instrument in SI: a term in units of the output is in the SI unit of its dimension.
 
     ``gravity`` [m/s^2] of the site is the unit of a in the terms of a gyrowheel. Raises `StudyError`, naming the file
@@ -104,7 +82,7 @@ def instrument_of(table: InstrumentTable, gravity: float, where: object) -> Inst
     return replace(instrument, noise=_noise(table.noise, unit, instrument.dwell, where))
 
 
-def _unit(table: InstrumentTable, where: object) -> Unit:
+def _unit(table: Any, where: object) -> Unit:
     """Unit of the outputs: one that the channels of a record may have."""
     if table.unit is None:
         return _unit_of_noise(table)
@@ -209,7 +187,7 @@ def _parse(text: object, form: _Form) -> tuple[Quantity, float] | None:
         return None
 
 
-def _unit_of_noise(table: InstrumentTable) -> Unit:
+def _unit_of_noise(table: Any) -> Unit:
     """The unit in which the noise of a reading is stated, or the SI unit of rate or acceleration."""
     usual = parse_unit(_USUAL_UNIT[table.kind])
     try:

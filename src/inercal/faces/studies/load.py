@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from inercal.faces.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN
+from inercal.faces.studies.starting import DISTRIBUTIONS, PATHS, POSITIONS, UNKNOWN, of_sections
 from inercal.foundation._toml import read_toml
 from inercal.foundation.errors import StudyError
 from inercal.foundation.keys import unheeded
@@ -123,8 +123,12 @@ def _texts(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _read(path: str | Path, overrides: Iterable[str], system: System) -> dict[str, Any]:
-    """The file with the overrides put in; refused where it is a study of another system."""
-    data = read_toml(path, StudyError)
+    """The file with the overrides put in; refused where it is a study of another system.
+
+    A table of sections is the study that names it, and nothing else but the site to fill in.
+    """
+    table = system.sections is not None and Path(path).suffix.lower() == ".csv"
+    data = of_sections(Path(path).name) if table else read_toml(path, StudyError)
     if is_map(data):
         raise StudyError(path, "found a column map, which goes behind --map, expected a study")
     rig = data.get("rig")

@@ -10,28 +10,14 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import core_schema
 
-from inercal.faces.studies.fields import (
-    AsTyped,
-    QuantityText,
-    Several,
-    SeveralTexts,
-    positive,
-    refusal,
-)
+from inercal.faces.studies.fields import AsTyped, QuantityText, positive, refusal
 from inercal.faces.studies.tables import Stated, replaced, table_of
-from inercal.foundation._toml import Strict
 from inercal.foundation.errors import StudyError
 from inercal.foundation.units import shown
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import FixedJoints, JointLimits, JointRanges
 from inercal.systems.selfcal.platform.plan import JointName, Move, PlatformPlan, Rest, Turn, path
 from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals
-
-AxisHeading = Annotated[Any, QuantityText("angle", "40 deg", words={"unknown": 0.0})]
-_TILT = SeveralTexts(
-    QuantityText("angle", "0 arcmin", lambda a: abs(a) <= 0.5 * math.pi, "an angle from -90 deg to 90 deg"),
-    "the one about north, the one about east",
-)
 
 
 class GimbalsTable(table_of(JointLimits), table_of(Gimbals), table_of(Base)):  # type: ignore[misc]
@@ -45,20 +31,6 @@ class GimbalsTable(table_of(JointLimits), table_of(Gimbals), table_of(Base)):  #
         default=FixedJoints(),
         title="Fixed joints",
         description="joints that do not turn, and their angles; all turn if absent",
-    )
-
-
-class PlacedRecordTable(Strict):
-    """A record of a platform on a base of its own; several are fitted together."""
-
-    file: Annotated[str, Field(min_length=1)] = Field(
-        description="of the record, as the command is given it", examples=["south.csv"]
-    )
-    heading: AxisHeading = Field(
-        default=None, description="of the base, from north to east; that of [rig] if absent"
-    )
-    tilt: Annotated[Several, _TILT] | None = Field(
-        default=None, description="of the base, about north and about east; that of [rig] if absent"
     )
 
 

@@ -171,3 +171,8 @@ def aoa_study() -> dict[str, Any]:
 def _keys(text: str) -> dict[str, Any]:
     """Keys of a study: it loads as it is, but for those that must be filled in."""
     return {"schema": 1, **tomllib.loads(text)}
+
+
+def of_sections(table: str) -> dict[str, Any]:
+    """The keys of a study that a table of sections by this name is by itself."""
+    return {"site": {"latitude": UNKNOWN}, "imu": {"method": "sections", "sections": table}}

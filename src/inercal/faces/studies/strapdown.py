@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import Field
 
 from inercal.faces.studies.common import StudyFile, site_on_earth
-from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.faces.studies.instrument import check_symbol, coefficient_of
 from inercal.faces.studies.tables import settings_of, table_of
 from inercal.foundation._toml import check
 from inercal.foundation.errors import StudyError
@@ -29,12 +29,6 @@ class StrapdownStudyFile(table_of(StrapdownSettings, tables=True), StudyFile):  
     )
     noise: table_of(Noise) = Field(  # type: ignore[valid-type]
         title="Noise", description="noise of the sensors, and of turns"
-    )
-    truth: dict[str, Typed] = Field(
-        default_factory=dict,
-        description="true coefficients of a simulated recording by symbol, outputs in m/s^2 and rad/s; those of a "
-        "perfect unit if absent",
-        examples=[{"D_F_x": "0.1 deg/h", "r_xx": "1 cm"}],
     )
 
 

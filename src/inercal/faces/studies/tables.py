@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import functools
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, is_dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, create_model
@@ -17,7 +19,7 @@ from inercal.faces.studies.fields import ExactText, QuantityText, Several, Sever
 from inercal.foundation._toml import Strict, settings_in
 from inercal.foundation.errors import InputError
 from inercal.foundation.keys import OUTPUT, Key, Reading, keys_of, unheeded
-from inercal.foundation.units import Quantity
+from inercal.foundation.units import Quantity, shown
 
 T = TypeVar("T")
 
@@ -28,7 +30,7 @@ def table_of(settings: type, tables: bool | None = None, needed: bool = True) ->
 
     ``tables``: of those keys the tables, or all but the tables; ``needed``: keys without a default must be there.
     """
-    hints = get_type_hints(settings)
+    hints = _hints(settings)
     system = settings.__module__.split(".")[:3][-1].capitalize()
     fields: dict[str, Any] = {
         key.name or field.name: (
@@ -40,6 +42,12 @@ def table_of(settings: type, tables: bool | None = None, needed: bool = True) ->
     }
     says = (settings.__doc__ or "").partition("\n\n")[0]
     return create_model(f"{system}{settings.__name__}", __base__=Strict, __doc__=says, **fields)
+
+
+@functools.cache
+def _hints(settings: type) -> dict[str, Any]:
+    """Types of the fields of settings."""
+    return get_type_hints(settings)
 
 
 def settings_of(settings: type[T], *tables: Any, **more: Any) -> T:
@@ -55,7 +63,7 @@ def replaced(usual: T, *tables: Any) -> T:
 
 def _stated(settings: type, tables: Sequence[Any]) -> dict[str, Any]:
     """Fields of settings whose keys stand in a table, and their values."""
-    hints = get_type_hints(settings)
+    hints = _hints(settings)
     values: dict[str, Any] = {}
     for field, key in keys_of(settings):
         name = key.name or field.name
@@ -84,10 +92,13 @@ def check_kind(settings: type, table: Strict, kind: str, word: str = "kind", at:
 class _Reader:
     """Lets a pydantic field hold settings: read as their table, built by `settings_of`, with absent keys as ``usual``.
 
-    Keys of one kind alone are checked by the key ``kind`` beside them.
+    Keys of one kind alone are checked by the key ``kind`` beside them. ``words`` may stand in place of the table, for
+    what they are; ``such`` is a good one.
     """
 
     usual: Any = None
+    words: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    such: object = None
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -102,8 +113,31 @@ class _Reader:
             except InputError as error:
                 raise refusal(error.message, error.where) from error
 
+        def worded(typed: Any, read: core_schema.ValidatorFunctionWrapHandler) -> Any:
+            if not isinstance(typed, str):
+                return read(typed)
+            if typed in self.words:
+                return Word(self.words[typed], typed)
+            words = " or ".join(f'"{word}"' for word in self.words)
+            raise refusal(
+                f"found {shown(typed)}, expected {words} or a table such as {_in_braces(self.such)}"
+            )
+
         table = handler.generate_schema(table_of(source, needed=self.usual is None))
-        return core_schema.no_info_after_validator_function(built, table)
+        made = core_schema.no_info_after_validator_function(built, table)
+        return core_schema.no_info_wrap_validator_function(worded, made) if self.words else made
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """That of the table, or a word."""
+        made = handler(schema)
+        return {"anyOf": [made, *({"const": word} for word in self.words)]} if self.words else made
+
+
+def _in_braces(example: Any) -> str:
+    """A table of texts as TOML has it on one line."""
+    return f"{{ {', '.join(f'{key} = {json.dumps(text)}' for key, text in example.items())} }}"
 
 
 Stated = Annotated[T, _Reader()]
@@ -155,7 +189,7 @@ def _value(typed: Any, hint: str) -> Any:
         case Word():
             return typed.value
         case Several():
-            return typed.values
+            return typed.quantities if "Quantity" in hint else typed.values
         case Quantity():
             return typed if "Quantity" in hint else typed.value
         case list():
@@ -168,8 +202,9 @@ def _value(typed: Any, hint: str) -> Any:
 def _type(key: Key, hint: Any, default: Any) -> Any:
     """The pydantic type of a key by that of its field: a list for a tuple, a table of one's own names for a mapping."""
     one: Any
-    if key.table:
-        one = Annotated[settings_in(hint), _Reader(default if is_dataclass(default) else None)]
+    if key.table and not key.reads:
+        usual = default if is_dataclass(default) else None
+        one = Annotated[settings_in(hint), _Reader(usual, key.words, key.example)]
     elif key.dimension == OUTPUT:
         one = str
     elif key.dimension:
@@ -186,12 +221,23 @@ def _type(key: Key, hint: Any, default: Any) -> Any:
         one = Annotated[Any, _Parsed(key.reads)]
     else:
         return _plain(hint)
-    shape, several = get_origin(hint), get_args(hint)[-1:] == (Ellipsis,)
-    return list[one] if shape is tuple and several else dict[str, one] if shape is Mapping else one
+    return _shaped(hint, one, bool(key.of))
+
+
+def _shaped(hint: Any, one: Any, row: bool) -> Any:
+    """The type of entries as the hint has them: lists for tuples, tables of one's own names for mappings; ``row``: a
+    tuple of plain values is one entry."""
+    shape, inside = get_origin(hint), get_args(hint)
+    if shape is Mapping:
+        return dict[str, one]
+    if shape is not tuple or inside[-1] is not Ellipsis or (row and get_origin(inside[0]) is not tuple):
+        return one
+    return list[_shaped(inside[0], one, row)]  # type: ignore[misc]
 
 
 def _plain(hint: Any) -> Any:
-    """The type of a plain value as TOML has it: a file is a text, a tuple of any length a list."""
+    """The type of a plain value as TOML has it: a file is a text, a tuple of any length a list; nothing is none."""
+    hint = _given(hint)
     if "Path" in str(hint):
         return Annotated[str, Field(min_length=1)]
     if hint in (int, float, bool):
@@ -201,13 +247,21 @@ def _plain(hint: Any) -> Any:
     return hint
 
 
+def _given(hint: Any) -> Any:
+    """The hint without None, which TOML does not have."""
+    kinds = [kind for kind in get_args(hint) if kind is not NoneType]
+    return kinds[0] if len(kinds) == 1 and len(get_args(hint)) == 2 else hint
+
+
 def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool) -> Any:
     """Meaning, default and bounds of a field; an absent quantity is None, the settings know what it stands for."""
     default: Any = field.default if field.default_factory is MISSING else {}
     if default is MISSING and not needed:
         default = None
     plain = not (key.dimension or key.table)
+    hint = _given(hint)
     listed = get_origin(hint) is tuple
+    long = listed or hint is str
     absent = (
         ...
         if default is MISSING
@@ -225,10 +279,10 @@ def _described(key: Key, field: dataclasses.Field[Any], hint: Any, needed: bool)
         default=absent,
         title=title,
         description=key.says,
-        ge=key.least if plain and not listed else None,
-        le=key.most if plain and not listed else None,
-        min_length=int(key.least or 0) or None if listed else None,
-        max_length=int(key.most or 0) or None if listed else None,
+        ge=key.least if plain and not long else None,
+        le=key.most if plain and not long else None,
+        min_length=int(key.least or 0) or None if long else None,
+        max_length=int(key.most or 0) or None if long else None,
         examples=None if key.example is None or quantity else [key.example],
         json_schema_extra={"default": key.default} if key.default else None,
     )

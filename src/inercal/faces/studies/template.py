@@ -8,15 +8,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from inercal.faces.studies.commented import commented
 from inercal.faces.studies.load import put, unfilled
-from inercal.faces.studies.schema import json_schema
+from inercal.faces.studies.schema import commented, json_schema
 from inercal.faces.studies.text import toml, with_keys
-from inercal.faces.studies.tolerances import SYMBOLS
 from inercal.foundation.instruments.by_angle import CHANNELS
 from inercal.foundation.rigs.tables import slots
 from inercal.foundation.units import Unit
 from inercal.systems.listed import SYSTEMS
+from inercal.systems.turntable.settings import SYMBOLS
 
 #: kind -> key, value for outputs of rate or acceleration, value for others (``{u}``), comment; of the channel on
 #: axis ``{x}`` (``{k}`` and ``{D}`` begin its terms), beside which lies ``{o}``; ``{need}`` of what must be stated

@@ -7,50 +7,14 @@ from typing import Annotated, Any
 from pydantic import Field, create_model, model_validator
 
 from inercal.faces.studies.fields import refusal
-from inercal.faces.studies.instrument import Typed, check_symbol, coefficient_of
+from inercal.faces.studies.instrument import check_symbol, coefficient_of
 from inercal.faces.studies.tables import settings_of, table_of
-from inercal.foundation._toml import Strict
 from inercal.foundation.designs.tolerances import Price
 from inercal.foundation.errors import QuantityError, StudyError
-from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
-from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.rigs.chain import Chain, Error
 from inercal.foundation.rigs.tables import TABLES, slots
 from inercal.foundation.units import parse_quantity, shown
-from inercal.systems.turntable.settings import Cost, Instrument, Tolerances
-
-DRIFT = "drift"
-"""The goal that is no coefficient."""
-
-SYMBOLS = {
-    kind: tuple(s for channel in channels for s in channel_model(kind, channel).symbols)
-    for kind, channels in CHANNELS.items()
-}
-"""Coefficients by kind of instrument."""
-
-_GOALS: dict[str, Any] = {
-    symbol: (
-        Typed | None,
-        Field(
-            default=None,
-            title=symbol,
-            description=f"wanted u of {symbol}: {TERMS[symbol].name}",
-            examples=["0.01 deg/h"],
-        ),
-    )
-    for symbols in SYMBOLS.values()
-    for symbol in symbols
-}
-
-
-class WantedTable(create_model("WantedOfTable", __base__=Strict, **_GOALS)):  # type: ignore[misc]
-    """Wanted uncertainties, for design tolerances: of coefficients, and of the drift after compensation."""
-
-    drift: Typed | None = Field(
-        default=None,
-        description="wanted u of the output that the coefficients predict, rms over all directions of gravity",
-        examples=["0.02 deg/h"],
-    )
+from inercal.systems.turntable.settings import DRIFT, SYMBOLS, Cost, Instrument, Tolerances, WantedOfTable
 
 
 class CostTable(table_of(Cost)):  # type: ignore[misc]
@@ -99,7 +63,7 @@ class CostsTable(_BY_NAME):  # type: ignore[misc]
 
 
 def tolerances_of(
-    goals: WantedTable,
+    goals: WantedOfTable,
     costs: CostsTable,
     chain: Chain,
     instrument: Instrument,
@@ -108,8 +72,8 @@ def tolerances_of(
 ) -> Tolerances:
     """Goals and prices in SI; raises `StudyError` for an unknown coefficient or error, or a size that is none."""
     kind, goal = instrument.kind, {}
-    for symbol in (name for name in type(goals).model_fields if name in goals.model_fields_set):
-        key, text = f"goal.{symbol}", getattr(goals, symbol)
+    for symbol, text in goals.stated.items():
+        key = f"goal.{symbol}"
         if symbol == DRIFT:
             value, u = _drift(text, instrument, key, where)
         else:

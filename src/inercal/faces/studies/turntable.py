@@ -10,42 +10,47 @@ from typing import Any
 from pydantic import Field
 
 from inercal.faces.studies.common import StudyFile, site_on_earth
-from inercal.faces.studies.instrument import InstrumentTable, instrument_of
-from inercal.faces.studies.positions import GridTable, PlanName, PositionsTable, compared, grid_of, plan_of
-from inercal.faces.studies.rig import RigTable, chain_of, limits_of
-from inercal.faces.studies.tables import settings_of, table_of
-from inercal.faces.studies.tolerances import CostsTable, WantedTable, tolerances_of
+from inercal.faces.studies.instrument import instrument_of
+from inercal.faces.studies.tables import Stated, settings_of, table_of
+from inercal.faces.studies.tolerances import CostsTable, tolerances_of
 from inercal.foundation._toml import check
 from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.keys import OUTPUT, keys_of
 from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.rigs.plans import Grid, StatedPositions
+from inercal.foundation.rigs.stated import StatedRig
+from inercal.foundation.rigs.stated_chain import chain_of, limits_of
+from inercal.foundation.rigs.stated_plan import compared, grid_of, plan_of
 from inercal.foundation.units import Unit, parse_quantity
-from inercal.systems.turntable.settings import Disturbances, PositionDesign, TurntableSettings
+from inercal.systems.turntable.settings import (
+    Disturbances,
+    Instrument,
+    PositionDesign,
+    TurntableSettings,
+    WantedOfTable,
+)
 
 
 class DesignTable(table_of(PositionDesign)):  # type: ignore[misc]
     """The search for positions."""
 
-    candidates: GridTable | None = Field(
+    candidates: Stated[Grid] | None = Field(
         default=None,
         title="Candidates",
         description="positions to choose from; every 10 deg from 0 if absent",
         examples=[{"phi1": 36, "phi2": 36, "offset": "none"}],
-    )
-    compare: list[PlanName] | None = Field(
-        default=None, description="named plans to set beside; all the table can take if absent"
     )
 
 
 class TurntableStudyFile(table_of(TurntableSettings), StudyFile):  # type: ignore[misc]
     """A study of a turntable, for `inercal sensitivity`, `design positions`, `simulate` and `calibrate turntable`."""
 
-    rig: RigTable = Field(title="Rig", description="the turntable and its errors")
-    positions: PositionsTable = Field(
-        default=PositionsTable(), title="Positions", description="where to stop; a grid of 10 deg if absent"
+    rig: Stated[StatedRig] = Field(title="Rig", description="the turntable and its errors")
+    positions: Stated[StatedPositions] = Field(
+        default=StatedPositions(), title="Positions", description="where to stop; a grid of 10 deg if absent"
     )
-    instrument: InstrumentTable = Field(
-        default=InstrumentTable(), title="Instrument", description="the instrument on the table"
+    instrument: table_of(Instrument) = Field(  # type: ignore[valid-type]
+        default=table_of(Instrument)(), title="Instrument", description="the instrument on the table"
     )
     design: DesignTable = Field(default=DesignTable(), title="Design", description="the search for positions")
     disturbances: table_of(Disturbances) = Field(  # type: ignore[valid-type]
@@ -53,7 +58,9 @@ class TurntableStudyFile(table_of(TurntableSettings), StudyFile):  # type: ignor
         title="Disturbances",
         description="what a simulation adds to the model",
     )
-    goal: WantedTable = Field(default=WantedTable(), title="Goal", description="wanted uncertainties")
+    goal: Stated[WantedOfTable] = Field(
+        default=WantedOfTable(), title="Goal", description="wanted uncertainties"
+    )
     cost: CostsTable = Field(
         default=CostsTable(), title="Cost", description="cost of tolerances, for design tolerances"
     )
@@ -73,6 +80,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
         _known([joint], chain.joints, key, path)
     if file.design.sensitivity is not None:
         _known(file.design.sensitivity.factors, chain.factors, "design.sensitivity.factors", path)
+    asked = file.design.compare if "compare" in file.design.model_fields_set else None
     return settings_of(
         TurntableSettings,
         file,
@@ -84,7 +92,7 @@ def turntable_study(data: Mapping[str, Any], path: str | Path) -> TurntableSetti
             PositionDesign,
             file.design,
             candidates=grid_of(file.design.candidates, chain, limits, "design.candidates", path, half=False),
-            compare=compared(file.design.compare, chain, limits, path),
+            compare=compared(asked, chain, limits, path),
         ),
         instrument=instrument,
         limits=limits,

@@ -19,7 +19,6 @@ from inercal.foundation.rigs.patterns import uniform
 from inercal.foundation.rigs.plans import grid, listed
 from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.positions.simulate import simulate
 from inercal.systems.turntable.settings import (
     Disturbances,
     Instrument,
@@ -27,6 +26,7 @@ from inercal.systems.turntable.settings import (
     RateTest,
     TurntableSettings,
 )
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import calibrate
 
 TABLE = "two_axis_turntable"
@@ -107,7 +107,7 @@ def settings_of(coefficients: dict[str, float], noise: float | None, latitude: f
 def _one(rng: np.random.Generator, noise: float, known: bool) -> dict[str, Array]:
     """A simulated calibration with that noise [deg/h], of which it is told if ``known``."""
     real = settings_of(drawn_instrument(rng), noise, rng.normal(LATITUDE, LATITUDE_U))
-    record = simulate(real, rng)
+    record = simulate_positions(real, rng)
     settings = settings_of({}, noise if known else None, LATITUDE)
     estimate = calibrate(record, settings).estimate
     true = real.instrument.coefficients
@@ -153,7 +153,7 @@ def _drift() -> list[float]:
     settings = _perfect()
     real = replace(_noiseless(settings), disturbances=Disturbances(ramp=_RAMP))
     fitted = replace(settings, instrument=replace(settings.instrument, bias_drift="linear"))
-    estimate = calibrate(simulate(real, np.random.default_rng(1)), fitted).estimate
+    estimate = calibrate(simulate_positions(real, np.random.default_rng(1)), fitted).estimate
     off = _off(estimate)
     off["DX_F"] -= 0.5 * _RAMP / _SIZE["D"]
     return [estimate.result["nuisances"][0]["value"] / _RAMP, *off.values()]
@@ -183,7 +183,7 @@ def _on_a_circle(error: str, times: int = 1) -> Array:
     text = _CIRCLE.format(error=error, positions=positions, noise=_NOISE * times**0.5)
     settings = turntable_study(tomllib.loads(text), Path("study.toml"))
     perfect = replace(_noiseless(settings), chain=turntable(TABLE, None))
-    return calibrate(simulate(perfect, np.random.default_rng(1)), settings).estimate.u
+    return calibrate(simulate_positions(perfect, np.random.default_rng(1)), settings).estimate.u
 
 
 def _six_times() -> Array:
@@ -225,7 +225,7 @@ def _measured() -> list[float]:
     commanded = real.plan.angles
     true = commanded + _ARCSEC * np.array([120.0, -200.0])
     true[:, 0] += 90.0 * _ARCSEC * np.sin(2.0 * commanded[:, 0] + np.radians(30.0))
-    record = simulate(replace(real, plan=listed(true)), np.random.default_rng(1))
+    record = simulate_positions(replace(real, plan=listed(true)), np.random.default_rng(1))
     for k, name in enumerate(("phi1", "phi2")):
         record[name].values[:] = np.degrees(commanded[:, k])
     settings = turntable_study(tomllib.loads(_MEASURED), Path("study.toml"))

@@ -19,7 +19,7 @@ from inercal.foundation.rigs.tables import turntable
 from inercal.foundation.sensitivities import averages, exact
 from inercal.foundation.sensitivities.indices import Indices
 from inercal.foundation.units import parse_unit
-from inercal.systems.turntable.positions.simulate import simulate
+from inercal.systems.turntable.simulate import simulate_positions
 from inercal.systems.turntable.task import calibrate
 
 _ARCMIN = np.radians(1.0 / 60.0)
@@ -98,7 +98,7 @@ def _without_errors() -> list[float]:
     latitude = np.radians(39.1)
     perfect = replace(settings_of(_WHEEL, None, latitude), chain=turntable(TABLE, None))
     settings = settings_of({}, 1e-6, latitude)
-    estimate = calibrate(simulate(perfect, np.random.default_rng(1)), settings).estimate
+    estimate = calibrate(simulate_positions(perfect, np.random.default_rng(1)), settings).estimate
     size = {"k": 1.0, "D": 50.0 * _DEG_PER_H}
     return [(estimate[name].value - true) / size[name[0]] for name, true in _WHEEL.items()]
 

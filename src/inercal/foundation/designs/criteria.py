@@ -17,7 +17,6 @@ the change of drift, so that condition numbers and efficiencies are those of the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,42 +28,6 @@ from inercal.foundation.errors import InputError
 from inercal.foundation.inference.identifiability import Identifiability, few_terms, identify, in_words
 
 Mask = NDArray[np.bool_]
-
-_ROUNDING = 1e-9
-"""Angles [rad] this far outside a limit count as on it."""
-
-
-def within(angles: ArrayLike, limits: Sequence[tuple[float, float] | None]) -> Mask:
-    """Which positions lie within the limits of the axes.
-
-    Parameters
-    ----------
-    angles : (m, joints) rad
-        Whole turns do not matter: 350° lies within -20° to 20°.
-    limits : sequence, one per joint
-        Lower and upper end [rad]; None for an axis that turns freely.
-
-    Returns
-    -------
-    (m,) bool
-
-    Raises
-    ------
-    ValueError
-        Another number of limits than of joints, or ends out of order.
-    """
-    positions = np.asarray(angles, dtype=float)
-    if positions.ndim != 2 or positions.shape[1] != len(limits):
-        raise ValueError(f"found angles {positions.shape}, expected (m, {len(limits)})")
-    inside = np.ones(len(positions), dtype=bool)
-    for angle, limit in zip(positions.T, limits, strict=True):
-        if limit is None:
-            continue
-        low, high = limit
-        if not low <= high:
-            raise ValueError(f"found the limits {low:g} to {high:g}, expected two numbers in order")
-        inside &= np.mod(angle - low + _ROUNDING, 2.0 * np.pi) <= high - low + 2.0 * _ROUNDING
-    return inside
 
 
 def insensitive(candidates: Candidates, indices: ArrayLike, limit: float, n: int) -> Mask:

@@ -18,6 +18,7 @@ from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.inference.evidence import AskedError, FitEvidence, evidence
 from inercal.foundation.inference.limits import LIMITS
 from inercal.foundation.inference.questions import JudgedFit, Question, questions
+from inercal.foundation.inference.signals import copies, ends, steps, uneven
 
 _CODES = {"order": "by_order", "place": "by_place", "reading": "by_reading", "history": "by_history"}
 
@@ -50,12 +51,29 @@ def judge(fit: JudgedFit, share: float = 1.0) -> tuple[Finding, ...]:
     order = tuple(_order(fit, of_fit, share * LIMITS.order_risk))
     if order:  # rows at other inputs: all questions would answer
         return order
-    return (*_ends(fit), *_steps(fit), *_answers(fit, of_fit, share * LIMITS.question_risk))
+    pairs = asked_of(of_fit, questions(fit))
+    spoken = answers(fit.names, fit.u, of_fit, pairs, share)
+    return (*ends(fit), *steps(fit), *copies(fit), *uneven(fit, of_fit, share), *spoken)
 
 
-def _answers(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Finding]:
-    """The question that speaks, if any does."""
-    pairs = _asked(of_fit, questions(fit))
+Asked = Sequence[tuple[Question, AskedError]]
+
+
+def answers(
+    names: Sequence[str], u: Array, of_fit: FitEvidence, pairs: Asked, share: float = 1.0
+) -> Iterator[Finding]:
+    """The finding of the question that speaks, if any does.
+
+    Parameters
+    ----------
+    names, u : (p,)
+        Values and their standard uncertainties.
+    of_fit, pairs : FitEvidence, list
+        What was asked, by `asked_of`.
+    share : float
+        Of the risk, where a result has several fits.
+    """
+    risk = share * LIMITS.question_risk
     if not pairs:
         return
     chances = np.array([of_fit.chance(asked) for _, asked in pairs])
@@ -69,15 +87,15 @@ def _answers(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Findi
     hits = hits[np.argsort(logs[hits], kind="stable")]
     alike = [int(k) for k in hits if logs[k] <= LIMITS.as_likely * logs[hits[0]]]
 
-    def left(k: int) -> tuple[int, int, float]:
+    def left(k: int) -> tuple[int, bool, int, float]:
         beside = of_fit.without(pairs[k][1])
         rest = [beside.ask(pairs[j][0].columns) for j in alike[: LIMITS.compared] if j != k]
         still = sum(beside.chance(asked) < risk / len(pairs) for asked in rest if _enough(beside, asked))
-        return still, pairs[k][1].count, float(logs[k])
+        return still, not pairs[k][0].code, pairs[k][1].count, float(logs[k])
 
     first = min(alike[: LIMITS.compared], key=left)
     yield _finding(
-        fit, of_fit, pairs, chances, first, [k for k in alike if k != first][:3], left(first)[0] > 0
+        names, u, of_fit, pairs, chances, first, [k for k in alike if k != first][:3], left(first)[0] > 0
     )
 
 
@@ -86,12 +104,12 @@ def _enough(of_fit: FitEvidence, asked: AskedError) -> bool:
     return 0 < asked.count <= max(1, (of_fit.dof - 2) // 2)
 
 
-def _asked(of_fit: FitEvidence, table: Sequence[Question]) -> list[tuple[Question, AskedError]]:
+def asked_of(of_fit: FitEvidence, table: Sequence[Question]) -> list[tuple[Question, AskedError]]:
     """Questions that show, those of one span once."""
     made, seen = [], set()
     probe = np.sin(1.0 + np.arange(len(of_fit.z)))
-    for question in table:
-        asked = of_fit.ask(question.columns)
+    every = of_fit.ask_all([question.columns for question in table])
+    for question, asked in zip(table, every, strict=True):
         if not _enough(of_fit, asked):
             continue
         span = (asked.count, round(float(np.sum(np.square(asked.basis.T @ probe))), 9))
@@ -102,9 +120,10 @@ def _asked(of_fit: FitEvidence, table: Sequence[Question]) -> list[tuple[Questio
 
 
 def _finding(
-    fit: JudgedFit,
+    names: Sequence[str],
+    u: Array,
     of_fit: FitEvidence,
-    pairs: Sequence[tuple[Question, AskedError]],
+    pairs: Asked,
     chances: Array,
     first: int,
     others: Sequence[int],
@@ -113,19 +132,56 @@ def _finding(
     """The finding of the question that speaks; ``more`` where something is left beside it."""
     question, asked = pairs[first]
     with np.errstate(divide="ignore", invalid="ignore"):
-        shift = np.nan_to_num(of_fit.shift(asked) / fit.u)
+        shift = np.nan_to_num(of_fit.shift(asked) / u)
     worst = int(np.argmax(np.abs(shift)))
     least = "at least " if more else ""
     moves = (
-        f"which shifts {fit.names[worst]} by {least}{abs(shift[worst]):.2g} u"
+        f"which shifts {names[worst]} by {least}{abs(shift[worst]):.2g} u"
         if abs(shift[worst]) > 0.1
         else "which shifts no value by more than 0.1 u"
     )
-    harm = tuple(name for name, by in zip(fit.names, np.abs(shift), strict=True) if by > LIMITS.harm)
+    harm = tuple(name for name, by in zip(names, np.abs(shift), strict=True) if by > LIMITS.harm)
     items = [_item("shown", question, chances[first]) | {"shift in u": float(shift[worst])}]
     items += [_item("as likely", pairs[k][0], chances[k]) for k in others]
     headline = f"{question.sentence}, {moves}."
-    return Finding(_CODES[question.cell], headline, "", harm, action=_LOOK[question.cell], items=tuple(items))
+    code, action = question.code or _CODES[question.cell], question.action or _LOOK[question.cell]
+    return Finding(code, headline, "", harm, action=action, items=tuple(items))
+
+
+def blind(names: Sequence[str], u: Array, of_fit: FitEvidence, pairs: Asked) -> Iterator[Finding]:
+    """The finding about questions that would shift a value by more than 2 u before they are answered.
+
+    Their size is that at which they are significant; parameters as in `answers`.
+    """
+    from scipy.special import chdtri, fdtri
+
+    worst: list[tuple[float, str, Question]] = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for question, asked in pairs:
+            m, risk = asked.count, LIMITS.question_risk / len(pairs)
+            stated = math.isinf(of_fit.noise_dof)
+            free = max(of_fit.dof - m, 1.0) + (0.0 if stated else of_fit.noise_dof)
+            size = chdtri(m, risk) if stated else m * fdtri(m, free, 1.0 - risk)
+            shifts = np.nan_to_num(np.linalg.norm(asked.reach, axis=1) / u) * math.sqrt(float(size))
+            k = int(np.argmax(shifts))
+            if shifts[k] > LIMITS.harm:
+                worst.append((float(shifts[k]), names[k], question))
+    if worst:
+        worst.sort(key=lambda one: -one[0])
+        by_cell = {cell: sum(one[2].cell == cell for one in worst) for cell in _CODES}
+        items: list[dict[str, str | float]] = [
+            {"unseen": one.sentence, "shifts": name, "by up to, in u": shift}
+            for shift, name, one in worst[:5]
+        ]
+        items += [
+            {"unseen": f"by {cell}", "faults": float(count)} for cell, count in by_cell.items() if count
+        ]
+        yield Finding(
+            "blind",
+            f"This plan cannot exclude {len(worst)} of {len(pairs)} faults that would shift a value by 2 u.",
+            action="Repeat sections at the end, in another order, and at other rates and angles.",
+            items=tuple(items),
+        )
 
 
 def _item(kind: str, question: Question, chance: float) -> dict[str, str | float]:
@@ -140,6 +196,8 @@ def _order(fit: JudgedFit, of_fit: FitEvidence, risk: float) -> Iterator[Finding
     ratio exceeds 1/r by chance with a probability of r at most (Markov).
     """
     rows = int(fit.row.max()) + 1
+    if fit.channel.min() < 0:
+        return
     if len(np.unique(fit.row * len(fit.channels) + fit.channel)) < rows * len(fit.channels) or rows < 4:
         return
     at = np.zeros((rows, len(fit.channels)), dtype=np.int64)
@@ -202,72 +260,6 @@ def _moved(
     for channel in taken:
         change[at[:, channel]] = fit.readings[at[moved, channel]] - fit.readings[at[:, channel]]
     return words, change, at[lost, taken]
-
-
-def _rms(fit: JudgedFit, own: NDArray[np.int64]) -> float:
-    """Rms residual of some readings."""
-    return float(np.sqrt(np.mean(np.square(fit.residuals[own]))))
-
-
-def _sigma(fit: JudgedFit, own: NDArray[np.int64]) -> float:
-    """Standard deviation of a reading of some, their median."""
-    return float(np.median(np.sqrt(np.diag(fit.covariance)[own])))
-
-
-def _grid(y: Array, rms: float) -> float:
-    """The step of which all differences of readings ``y`` (n,) are multiples; 0 where there is none.
-
-    A plan of regular inputs makes multiples too, but only as exact as its scatter ``rms``.
-    """
-    steps = np.diff(np.unique(y))
-    steps = steps[steps > 1e-9 * np.ptp(y)]
-    if len(steps) < 3:
-        return 0.0
-    step = float(steps.min())
-    left = float(np.abs(steps - step * np.round(steps / step)).max())
-    return step if left < 1e-3 * min(step, rms) else 0.0
-
-
-def _ends(fit: JudgedFit) -> Iterator[Finding]:
-    """Channels with equal readings at an end where the model differs."""
-    for channel, name in enumerate(fit.channels):
-        own = np.flatnonzero(fit.channel == channel)
-        y, model = fit.readings[own], fit.predicted[own]
-        if _grid(y, _rms(fit, own)) > 0.0 or not np.ptp(y):
-            continue
-        for word, end in (("upper", y.max()), ("lower", y.min())):
-            tied = np.abs(y - end) <= 1e-12 * np.ptp(y)
-            if tied.sum() > 1 and np.abs(model[tied] - model[tied].mean()).max() > LIMITS.tied * _sigma(
-                fit, own
-            ):
-                yield Finding(
-                    "saturation",
-                    f"{int(tied.sum())} readings of {name} are equal at its {word} end, where the model differs.",
-                    "",
-                    EVERYTHING,
-                    action="Take these readings out, or measure within the range of the sensor.",
-                )
-
-
-def _steps(fit: JudgedFit) -> Iterator[Finding]:
-    """Channels whose steps are larger than the scatter of their readings, and hence no noise."""
-    for channel, name in enumerate(fit.channels):
-        own = np.flatnonzero(fit.channel == channel)
-        rms = _rms(fit, own)
-        step = _grid(fit.readings[own], rms)
-        if step <= rms:
-            continue
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shift = np.nan_to_num(np.linalg.norm(fit.gain[:, own], axis=1) * step / math.sqrt(12.0) / fit.u)
-        harm = tuple(value for value, by in zip(fit.names, shift, strict=True) if by > LIMITS.harm)
-        if harm:
-            yield Finding(
-                "coarse_output",
-                f"The output {name} has steps of {step / rms:.2g} times its scatter, so that rounding is no noise.",
-                "",
-                harm,
-                action="Record more digits, or average over samples that noise spreads over several steps.",
-            )
 
 
 def gross(fit: JudgedFit) -> float:

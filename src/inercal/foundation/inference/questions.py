@@ -8,13 +8,14 @@ are made of predictions, never of readings, whose own noise would be taken for a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.inference.limits import LIMITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +39,15 @@ class JudgedFit:
     gain : (p, n) change of the values by each reading
     by_value : (n, p) change of the readings by each value
     beside : (n, k) columns of all else that was fitted, or is known to be there
-    readings, residuals : (n,) readings, and readings less model
-    covariance : (n, n) of the readings
-    row, channel : (n,) numbers from 0, of the test's rows in the order of time and of the channels
+    readings, residuals : (n,) readings, and readings less model; unknowns whose prior is in ``covariance`` at its mean
+    covariance : (n, n) of the readings, or (n,) variances of those whose evidence is made elsewhere
+    row, channel : (n,) numbers from 0, of the test's rows in the order of time and of the channels; a channel of -1 is
+        none: a condition that is fitted like a reading
     time : (n,)
     channels : names of the channels
     inputs : inputs that the model takes as stated
     noise_dof : as in `inercal.foundation.inference.evidence.FitEvidence`
+    part : (n,) numbers from 0 of the ``parts`` of the test, such as files, by name; -1 for none
     """
 
     names: tuple[str, ...]
@@ -62,11 +65,35 @@ class JudgedFit:
     channels: tuple[str, ...]
     inputs: tuple[StatedInput, ...]
     noise_dof: float
+    part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    parts: tuple[str, ...] = ()
 
     @property
     def predicted(self) -> Array:
         """The readings (n,) by the model."""
         return self.readings - self.residuals
+
+    @property
+    def triads(self) -> dict[str, list[int]]:
+        """Channels by the heads of their names, such as ``acc`` of ``acc_x``; under "" where all have one head."""
+        heads: dict[str, list[int]] = {}
+        for k, name in enumerate(self.channels):
+            heads.setdefault(name.rpartition("_")[0] or name, []).append(k)
+        return heads if len(heads) > 1 else {"": list(range(len(self.channels)))}
+
+    @property
+    def ranging(self) -> NDArray[np.bool_]:
+        """Channels (c,) whose predictions range over many times their noise, so that shapes of them mean something."""
+        variance = self.covariance if self.covariance.ndim == 1 else np.diag(self.covariance)
+        sigma, y = np.sqrt(variance), self.predicted
+        return np.array(
+            [
+                bool(np.ptp(y[own]) > LIMITS.least_range * np.median(sigma[own]))
+                if (own := self.channel == k).any()
+                else False
+                for k in range(len(self.channels))
+            ]
+        )
 
     @property
     def per_channel(self) -> Array:
@@ -77,7 +104,8 @@ class JudgedFit:
 @dataclass(frozen=True, eq=False)
 class Question:
     """One pair: ``cell`` is order, place, reading or history; ``what`` (``plural`` or not) does what ``verb`` and
-    ``rest`` say, by the ``columns`` (n, m)."""
+    ``rest`` say, by the ``columns`` (n, m). Where the physics of a system names the cause, ``code`` and ``action`` are
+    those of its finding."""
 
     cell: str
     what: str
@@ -85,6 +113,8 @@ class Question:
     verb: str
     rest: str
     columns: Array
+    code: str = ""
+    action: str = ""
 
     @property
     def sentence(self) -> str:
@@ -101,6 +131,9 @@ class _Subject:
     plural: bool
     columns: Array
 
+
+_TRIADS = {"acc": "the accelerometers", "gyro": "the gyro"}
+"""Channels in words by the head of their names."""
 
 _STEPS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 """Places of steps that are asked for, over the length of a record."""
@@ -121,15 +154,20 @@ def _times(columns: Array, shape: Array) -> Array:
 
 def _subjects(fit: JudgedFit) -> list[_Subject]:
     """Biases, gains, values by family, inputs."""
-    several = len(fit.channels) > 1
     one = fit.per_channel
-    made = [_Subject("the biases" if several else "the bias", several, one)]
-    made.append(_Subject("the gains" if several else "the gain", several, one * fit.predicted[:, None]))
-    if several:
-        made.append(_Subject("the gain of all channels", False, fit.predicted[:, None]))
+    made = []
+    for triad, its in fit.triads.items():
+        own, plural = one[:, its], len(its) > 1
+        of = triad and f" of {_TRIADS.get(triad, triad)}"
+        made.append(_Subject(f"the biases{of}" if plural else f"the bias{of}", plural, own))
+        gains = own * fit.predicted[:, None]
+        made.append(_Subject(f"the gains{of}" if plural else f"the gain{of}", plural, gains))
+        if plural:
+            every = gains.sum(axis=1, keepdims=True)
+            made.append(_Subject(f"the gain of all channels{of}", False, every))
     families: dict[str, list[int]] = {}
     for k, name in enumerate(fit.names):
-        families.setdefault(name.split("_")[0], []).append(k)
+        families.setdefault(name.rpartition("_")[0] or name, []).append(k)
     for family, members in families.items():
         columns = fit.by_value[:, members]
         if not columns.any():
@@ -137,35 +175,60 @@ def _subjects(fit: JudgedFit) -> list[_Subject]:
         alone = len(members) == 1
         what = fit.names[members[0]] if alone else f"the values {family}"
         made.append(_Subject(what, not alone, columns))
+        if (turned := _as_one(fit.names, members, fit.by_value)) is not None:
+            made.append(_Subject(f"the frame of {family}", False, turned))
     return made + [_Subject(f"the input {given.name}", False, given.slope[:, None]) for given in fit.inputs]
 
 
-def _by_order(fit: JudgedFit) -> Iterator[Question]:
-    """Drift, bend, sway, settling and steps over time."""
-    s = (fit.time - fit.time.min()) / max(float(np.ptp(fit.time)), 1e-300)
-    shapes = [
+def _as_one(names: Sequence[str], members: Sequence[int], by_value: Array) -> Array | None:
+    """Columns (n, 3) by a rotation of a family of six misalignments as one; None for another family."""
+    at = {names[k].rpartition("_")[2]: k for k in members}
+    pairs = [("yz", "zy"), ("zx", "xz"), ("xy", "yx")]
+    if not all(pair in at for both in pairs for pair in both):
+        return None
+    return np.stack([by_value[:, at[one]] - by_value[:, at[other]] for one, other in pairs], axis=1)
+
+
+def over_time(time: Array) -> list[tuple[str, str, Array]]:
+    """Shapes (n, m) over the times (n,) of a record, behind what something does that has them: a verb, and the rest."""
+    s = (time - time.min()) / max(float(np.ptp(time)), 1e-300)
+    return [
         ("drift", "over the record", s[:, None]),
         ("bend", "over the record", np.stack([s, s**2, s**3], axis=1)),
         ("sway", "slowly", np.cos(math.pi * s[:, None] * np.arange(1, 7))),
         ("settle", "at the start", np.exp(-s[:, None] / np.array([0.05, 0.25]))),
         *(("step", f"at {100 * at:.0f} % of the record", (s > at).astype(float)[:, None]) for at in _STEPS),
     ]
+
+
+def lagging(x: Array) -> Array:
+    """A state (n,) that follows ``x`` (n,) from row to row."""
+    made, state = np.empty_like(x), 0.0
+    for k, value in enumerate(x):
+        state += _LAG * (value - state)
+        made[k] = state
+    return made
+
+
+def _by_order(fit: JudgedFit) -> Iterator[Question]:
+    """Drift, bend, sway, settling and steps over time."""
     for subject in _subjects(fit):
-        for verb, rest, shape in shapes:
+        for verb, rest, shape in over_time(fit.time):
             yield Question("order", subject.what, subject.plural, verb, rest, _times(subject.columns, shape))
-    late = (s > np.median(s)).astype(float)[:, None]
+    late = (fit.time > np.median(fit.time)).astype(float)[:, None]
     yield Question("order", "the values", True, "differ", "between the halves", fit.by_value * late)
 
 
 def _by_place(fit: JudgedFit) -> Iterator[Question]:
     """Harmonics or curves over the coordinate of each input, of the input and of the biases."""
-    bias, *_ = _subjects(fit)
+    biases = [subject for subject in _subjects(fit) if subject.what.startswith("the bias")]
     for given in fit.inputs:
         for rest, shape in _places(given):
             slope = given.slope[:, None]
             yield Question("place", f"the input {given.name}", False, "err", rest, _times(slope, shape))
             over = f"with {given.name} {rest}"
-            yield Question("place", bias.what, bias.plural, "change", over, _times(bias.columns, shape))
+            for bias in biases:
+                yield Question("place", bias.what, bias.plural, "change", over, _times(bias.columns, shape))
 
 
 def _places(given: StatedInput) -> list[tuple[str, Array]]:
@@ -191,7 +254,7 @@ def _places(given: StatedInput) -> list[tuple[str, Array]]:
 def _by_reading(fit: JudgedFit) -> Iterator[Question]:
     """Distortions of the output by itself, of each channel and of all alike."""
     by_channel: dict[tuple[str, str], list[Array]] = {}
-    for own in fit.per_channel.T:
+    for own in fit.per_channel[:, fit.ranging].T:
         y = fit.predicted * own
         size, used = np.abs(y), own > 0.0
         top, middle = max(float(size.max()), 1e-300), float(np.median(size[used]))
@@ -234,21 +297,19 @@ def neighbours(fit: JudgedFit, x: Array, by: int) -> Array:
 
 
 def _lagging(fit: JudgedFit, x: Array) -> Array:
-    """A state that follows ``x`` (n,) from row to row."""
+    """A state that follows ``x`` (n,) from row to row in each channel."""
     made = np.zeros_like(x)
     for own in fit.per_channel.T:
         index = np.flatnonzero(own)
-        state = 0.0
-        for k in index[np.argsort(fit.row[index], kind="stable")]:
-            state += _LAG * (x[k] - state)
-            made[k] = state
+        index = index[np.argsort(fit.row[index], kind="stable")]
+        made[index] = lagging(x[index])
     return made
 
 
 def _by_history(fit: JudgedFit) -> Iterator[Question]:
     """Memory of outputs and of inputs."""
-    one, y = fit.per_channel, fit.predicted
-    several = len(fit.channels) > 1
+    one, y = fit.per_channel[:, fit.ranging], fit.predicted * np.any(fit.per_channel[:, fit.ranging], axis=1)
+    several = one.shape[1] > 1
     what = "the outputs" if several else "the output"
     load = y / max(float(np.abs(y).max()), 1e-300)
     change = y - neighbours(fit, y, -1)

@@ -15,12 +15,13 @@ import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import RecordError
-from inercal.foundation.findings import Finding, Status
+from inercal.foundation.findings import Finding, Status, settled
 from inercal.foundation.instruments.noise import SYMBOLS
 from inercal.foundation.instruments.terms import noise_term
 from inercal.foundation.noise.coefficients import NoiseCoefficients, noise_coefficients
 from inercal.foundation.noise.deviation import AllanDeviation, allan_deviation, regular
 from inercal.foundation.noise.limits import LIMITS
+from inercal.foundation.noise.measured import measured, of_coarse, of_held
 from inercal.foundation.records.column import Column, usable_interval
 from inercal.foundation.records.dwells import window_samples
 from inercal.foundation.records.places import counted
@@ -182,7 +183,8 @@ def noise_of(record: Record) -> NoiseResult:
     channels_of: dict[Finding, list[str]] = {}
     findings: list[Finding] = []
     disturbed: dict[str, Unrest] = {}
-    for columns in groups:
+    for rows, columns in groups:
+        findings += of_held(rows, columns) + of_coarse(columns)
         interval, samples = _on_a_grid(columns)
         curve = allan_deviation(samples, interval, level=LEVEL)
         for at, column in enumerate(columns):
@@ -203,8 +205,8 @@ def noise_of(record: Record) -> NoiseResult:
     return NoiseResult(replace(estimate, timing={"solve": time.perf_counter() - clock}), tuple(channels))
 
 
-def _groups(record: Record) -> list[list[Column]]:
-    """Channels of motion, grouped by clock."""
+def _groups(record: Record) -> list[tuple[float, list[Column]]]:
+    """Channels of motion that are measured together, without rows that are no samples of them."""
     groups: dict[int, list[Column]] = {}
     for column in record.columns.values():
         if _CHANNELS.fullmatch(column.name) and column.unit.dimension in _DIMENSIONS:
@@ -216,7 +218,7 @@ def _groups(record: Record) -> list[list[Column]]:
             f"found {', '.join(record.columns) or 'no channels'}, expected acceleration or rate, such as acc_x or "
             "gyro_x",
         )
-    return list(groups.values())
+    return [part for columns in groups.values() for part in measured(columns)]
 
 
 def _on_a_grid(columns: list[Column]) -> tuple[float, Array]:
@@ -305,7 +307,7 @@ def _assemble(
         np.array(values),
         Uncertainty(block_diag(np.zeros((0, 0)), *blocks), np.array(dof)),
         _verdict(channels, disturbed),
-        findings=(*record.findings, *findings),
+        findings=(*settled(record.findings, "no_data"), *findings),
         statistics={
             "samples": float(longest.samples),
             "rate_hz": 1.0 / longest.interval,

@@ -42,10 +42,24 @@ Origin = int | str | tuple[str, int]
 
 
 @dataclass(frozen=True)
+class TimeForm:
+    """Stamps other than plain numbers: the ``order`` of dates and times in words, empty of numbers, the column of the
+    rest ``beside`` (time of day, or fraction of a second in units of ``rest`` [s]), and the number at which a counter
+    falls to zero (``wrap``, 0 for none)."""
+
+    order: str = ""
+    beside: Origin | None = None
+    rest: float = 0.0
+    wrap: float = 0.0
+
+
+@dataclass(frozen=True)
 class Channel:
     """A channel wanted from a file: its name, where it is found and how it is to be understood.
 
-    ``factor`` is sign times scale; ``increment`` marks angles or velocities gained since the last row.
+    ``factor`` is sign times scale; ``increment`` marks angles or velocities gained since the last row. One that was
+    recognised has a ``grade`` (certain, likely, guess), the reason (``because``), and a guess its ``question``. The
+    time may have ``stamps``.
     """
 
     name: str
@@ -53,6 +67,10 @@ class Channel:
     unit: Unit
     factor: float = 1.0
     increment: bool = False
+    grade: str = ""
+    because: str = ""
+    question: str = ""
+    stamps: TimeForm | None = None
 
     @property
     def sensor(self) -> str:

@@ -48,5 +48,23 @@ class Limits:
     fewest_windows: int = 20
     """Windows of a recording whose rests are looked for."""
 
+    erased_rows: int = 50
+    """Equal rows in a row from which they may be no data."""
+
+    erased_ratio: float = 20.0
+    """Length of such a stretch, over what is usual elsewhere, from which they are none."""
+
+    noisy_steps: float = 0.7
+    """Second differences of an output over its first ones, from which it is noisy: of white noise 1.7."""
+
+    fewest_runs: int = 30
+    """Runs of equal values by which it is told whether each value stands for several rows."""
+
+    short_runs: float = 0.02
+    """Share of shorter runs up to which it does."""
+
+    coarse_noise: float = 0.6
+    """Standard deviation of an output at rest, over its step, below which its noise is not known."""
+
 
 LIMITS = Limits()

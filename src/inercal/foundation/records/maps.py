@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, field_validator
 
 from inercal.foundation._toml import Strict, check, read_toml
 from inercal.foundation.errors import InputError, MapError
-from inercal.foundation.records.channels import Channel, Origin, is_channel, misfit, nearest, needs_unit
-from inercal.foundation.records.checksums import CHECKS, NONE
-from inercal.foundation.records.frames import Frame
-from inercal.foundation.records.read.table import FileOptions, FileShare
+from inercal.foundation.records.channels import (
+    Channel,
+    Origin,
+    TimeForm,
+    is_channel,
+    misfit,
+    nearest,
+    needs_unit,
+)
+from inercal.foundation.records.file_entry import FileEntry
+from inercal.foundation.records.read.table import FileShare
 from inercal.foundation.units import parse_quantity, parse_unit, shown
+
+OPEN = "?"
+"""The rate of a map that is still to be stated."""
+
+ASIDE = "none"
+"""The answer by which channels are left aside."""
 
 
 class ColumnEntry(Strict):
@@ -36,6 +48,11 @@ class ColumnEntry(Strict):
     kind: Literal["rate", "increment"] = Field(
         default="rate", description="increment: angle or velocity gained since the last row"
     )
+    grade: Literal["certain", "likely", "guess"] | None = Field(
+        default=None, description="how sure a recognised entry is; a map with a guess does not run"
+    )
+    because: str = Field(default="", description="why a recognised entry is so")
+    question: str = Field(default="", description="what a guess asks")
 
     @field_validator("origin")
     @classmethod
@@ -61,171 +78,6 @@ class ColumnEntry(Strict):
         return value
 
 
-def _refusal(message: str) -> PydanticCustomError:
-    """An error that `inercal.foundation._toml.check` reports in just these words, after the dotted key."""
-    return PydanticCustomError("refused", "refused", {"error": InputError("", message)})
-
-
-class FileEntry(Strict):
-    """``[file]``: how the files are laid out; what is left out is found out."""
-
-    delimiter: str | None = Field(default=None, description="what parts the fields; found out if absent")
-    decimal: Literal[".", ","] | None = Field(default=None, description="decimal mark; found out if absent")
-    comment: str | None = Field(
-        default=None, description="what begins a line that is passed over; # and % if absent"
-    )
-    skip: int = Field(
-        default=0, ge=0, description="lines before the header or the numbers; bytes of a binary file"
-    )
-    variable: str | None = Field(
-        default=None, description="variable, group or topic that holds the columns, where a file has several"
-    )
-    transpose: bool = Field(
-        default=False, description="the file lies on its side: its rows are channels, as of a 3 x n array"
-    )
-    binary: str | list[str] | None = Field(
-        default=None,
-        description="type of the numbers of a raw binary file, or of each field: byte order < (little) or >, kind f, i "
-        "or u, and bytes",
-        examples=["<f4", [">u4", "<i2"]],
-    )
-    fields: list[str] = Field(
-        default=[], description="names of the numbers of each row of a raw binary file, for `from`",
-        examples=[["t", "gyro_x", "gyro_y", "gyro_z"]],
-    )  # fmt: skip
-    sync: str | None = Field(
-        default=None,
-        description="bytes in hexadecimal with which each row of a raw binary file begins, which is then a frame",
-        examples=["AA 55"],
-    )
-    check: str | None = Field(
-        default=None, description="check at the end of a frame, by name", examples=["crc-16/modbus"]
-    )
-    check_begin: int = Field(
-        default=0, ge=0, description="byte of a frame, from 0, with which its check begins"
-    )
-    check_order: Literal["<", ">"] = Field(
-        default="<", description="byte order of the check: < (little) or >"
-    )
-    length: int | None = Field(
-        default=None, gt=0, le=65536,
-        description="bytes of a whole frame, where some between the fields and the check are of no use",
-    )  # fmt: skip
-    counter: str | None = Field(
-        default=None,
-        description="field that goes up by one from frame to frame, which tells of those that are missing",
-    )
-
-    @field_validator("binary")
-    @classmethod
-    def _is_binary(cls, value: str | list[str] | None) -> str | list[str] | None:
-        """Types of numbers, the byte order stated; bytes of no use in a list."""
-        for each in [value] if isinstance(value, str) else value or ():
-            unused = isinstance(value, list) and re.fullmatch(r"x[1-9]\d{0,3}", each)
-            if not unused and not re.fullmatch(r"[<>](f[48]|[iu][248])|[iu]1", each):
-                raise ValueError(f'expected a type such as "<f4", ">i2" or "u1", not {shown(each)}')
-        return value
-
-    @field_validator("sync")
-    @classmethod
-    def _is_sync(cls, value: str | None) -> str | None:
-        """Bytes in hexadecimal."""
-        if value is not None and not re.fullmatch(r"(?:[0-9A-Fa-f]{2} ?){1,16}", value):
-            raise ValueError('expected 1 to 16 bytes in hexadecimal such as "AA 55"')
-        return value
-
-    @field_validator("check")
-    @classmethod
-    def _is_check(cls, value: str | None) -> str | None:
-        """The name of a check."""
-        if value is not None and value not in CHECKS:
-            raise ValueError(f"expected one of {', '.join(CHECKS)}")
-        return value
-
-    @property
-    def types(self) -> list[str]:
-        """The type of each field of a binary file."""
-        return self.binary if isinstance(self.binary, list) else [self.binary or ""] * len(self.fields)
-
-    @property
-    def frame(self) -> Frame | None:
-        """The layout of a frame, None where the file has none."""
-        if self.sync is None:
-            return None
-        check = NONE if self.check is None else CHECKS[self.check]
-        what = bytes.fromhex(self.sync), tuple(self.fields), tuple(self.types), check, self.check_begin
-        return Frame(*what, self.check_order, self.length or 0, self.counter or "")
-
-    @model_validator(mode="after")
-    def _framed(self) -> FileEntry:
-        """Keys of frames fit together."""
-        own = {"check": self.check, "length": self.length, "counter": self.counter}
-        if self.sync is None or self.binary is None:
-            given = next((name for name, value in own.items() if value is not None), None)
-            given = given if self.sync is None else "sync"
-            if self.binary is not None and any(each.startswith("x") for each in self.types):
-                given = "a type x"
-            if given:
-                raise _refusal(f"found {given} alone, expected sync, binary and fields for frames")
-            return self
-        if self.transpose or not self.fields or len(self.types) != len(self.fields):
-            return self  # refused below
-        frame = self.frame
-        if frame is None or frame.size < frame.least:
-            raise _refusal(
-                f"found a length of {self.length}, expected {frame.least if frame else 0} bytes at least"
-            )
-        if self.check_begin >= frame.size - frame.check.width // 8:
-            raise _refusal(f"found check_begin {self.check_begin}, expected a byte before the check")
-        kinds = dict(zip(self.fields, self.types, strict=True))
-        if self.counter is not None and not re.fullmatch(r"[<>]u[24]|u1", kinds.get(self.counter, "")):
-            raise _refusal(
-                f"found the counter {shown(self.counter)}, expected the name of a field of a type such as "
-                '"u1" or "<u4"'
-            )
-        if all(each.startswith("x") for each in self.types):
-            raise _refusal("found bytes of no use alone, expected a number at least")
-        return self
-
-    @model_validator(mode="after")
-    def _described(self) -> FileEntry:
-        """A binary file has a type for each field, and nothing of a text."""
-        if self.binary is None and self.fields:
-            raise _refusal("found fields without binary, expected both for a raw binary file")
-        if self.binary is None:
-            return self
-        types = self.types
-        if self.sync is not None and self.transpose:
-            raise _refusal("found transpose with sync, expected frames one after the other")
-        if not self.fields or len(types) != len(self.fields) or len(set(self.fields)) < len(self.fields):
-            raise _refusal(
-                f"found {len(types)} types of binary for {len(self.fields)} fields, expected one "
-                "for each, or one for all, "
-                "and a different name for each"
-            )
-        if self.delimiter or self.decimal or self.comment or self.variable:
-            raise _refusal(
-                "found delimiter, decimal, comment or variable, expected none for a raw binary file"
-            )
-        return self
-
-    @field_validator("delimiter")
-    @classmethod
-    def _is_delimiter(cls, value: str | None) -> str | None:
-        """One character that no number is written with."""
-        if value is not None and (len(value) != 1 or value.isalnum() or value in '+-."\r\n'):
-            raise ValueError('expected one character such as ",", ";", "\\t" or " " (any blanks)')
-        return value
-
-    @field_validator("decimal")
-    @classmethod
-    def _is_decimal(cls, value: str | None, info: ValidationInfo) -> str | None:
-        """A comma cannot both part fields and mark decimals."""
-        if value == "," and info.data.get("delimiter") == ",":
-            raise ValueError("expected another than the delimiter")
-        return value
-
-
 class NamedFileEntry(FileEntry):
     """``[file.NAME]``: one of several files, or of the clocks of one, with its own layout and columns."""
 
@@ -242,6 +94,28 @@ class TimeEntry(Strict):
         examples=["100.00(1) Hz"],
     )
     ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
+    stamps: Literal["year-first", "day-first", "month-first", "time of day"] | None = Field(
+        default=None,
+        description="order of dates with times in words; time of day alone goes on over midnight",
+    )
+    beside: Any = Field(
+        default=None,
+        description="column of what stands beside t: the time of day of a date, or the rest of whole seconds",
+        examples=["Time"],
+    )
+    rest: str | None = Field(default=None, description="unit of the rest of whole seconds", examples=["ns"])
+    wrap: float = Field(
+        default=0.0, ge=0.0, description="number at which the counter t falls to zero", examples=[4294967296]
+    )
+
+    @property
+    def of_t(self) -> TimeForm | None:
+        """The stamps of the channel t, None where they are plain numbers."""
+        if not (self.stamps or self.wrap or self.rest):
+            return None
+        rest = parse_unit(self.rest, "time.rest").factor if self.rest else 0.0
+        beside = tuple(self.beside) if isinstance(self.beside, list) else self.beside
+        return TimeForm(self.stamps or "", beside, rest, self.wrap)
 
 
 class MapEntry(Strict):
@@ -258,7 +132,7 @@ class RecordMap:
 
     ``parts`` holds the plain ``[columns]`` (its name is empty) and each ``[file.NAME]``; ``rate`` is the
     sample rate [Hz] of ``[time]`` or None, ``rate_u`` its relative standard uncertainty, and ``ignore_time`` asks to
-    use it in place of any time column.
+    use it in place of any time column. One that is not ``written`` was recognised as the files were read.
     """
 
     path: Path
@@ -266,6 +140,95 @@ class RecordMap:
     rate: float | None = None
     ignore_time: bool = False
     rate_u: float = 0.0
+    written: bool = True
+
+    @property
+    def channels(self) -> Iterator[Channel]:
+        """The channels of all parts."""
+        return (channel for part in self.parts for channel in part.channels or ())
+
+    @property
+    def taken(self) -> dict[str, str]:
+        """For each sensor that was recognised the columns that it is in, their unit, the grade and the reason."""
+        said: dict[str, list[Channel]] = {}
+        for channel in self.channels:
+            if channel.grade:
+                said.setdefault(channel.sensor, []).append(channel)
+        return {sensor: _in_words(channels) for sensor, channels in said.items()}
+
+    def answered(self, answers: Mapping[str, str]) -> RecordMap:
+        """The map with a unit, or ``none``, in place of that of a sensor or channel, and ``rate`` as the sample rate.
+
+        Raises `InputError` for an answer to nothing that there is.
+        """
+        there = {name for channel in self.channels for name in (channel.name, channel.sensor)}
+        check_answers(answers, there)
+        rate, rate_u = self.rate, self.rate_u
+        if "rate" in answers:
+            rate, rate_u = _rate(TimeEntry(rate=answers["rate"]), "--answer")
+        parts = tuple(
+            replace(part, channels=tuple(_answered(part.channels or (), answers))) for part in self.parts
+        )
+        return replace(self, parts=parts, rate=rate, rate_u=rate_u)
+
+    def refuse_guess(self) -> None:
+        """Refuse a map with a guess, by its question and how to answer it; raises `MapError`."""
+        for part in self.parts:
+            for channel in part.channels or ():
+                if channel.grade == "guess":
+                    table = f"file.{part.name}.columns" if part.name else "columns"
+                    asked = channel.question or f"Is the unit of {channel.name} {channel.unit.symbol}?"
+                    answer = f"{channel.sensor}={channel.unit.symbol}"
+                    aside = f"{channel.sensor}={ASIDE}"
+                    edit = ", or correct the unit there and take out grade" if self.written else ""
+                    raise MapError(
+                        f"{self.path}: {table}.{channel.name}" if self.written else self.path,
+                        f'{asked} Answer it with --answer "{answer}" or another unit, or leave it aside with '
+                        f'"{aside}"{edit}',
+                    )
+
+
+def answers_of(texts: Iterable[str]) -> dict[str, str]:
+    """Answers as typed, ``gyro=deg/s``, by what they are of; raises `InputError` for other texts."""
+    answers = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise InputError("--answer", f"found {shown(text)}, expected NAME=VALUE such as gyro=deg/s")
+        answers[name] = value
+    return answers
+
+
+def check_answers(answers: Mapping[str, str], there: Iterable[str]) -> None:
+    """Refuse answers to other than a channel or sensor that is there, or the rate; raises `InputError`."""
+    known = {*there, "rate"}
+    for name in answers:
+        if name not in known:
+            raise InputError("--answer", f"found {shown(name)}, expected one of {', '.join(sorted(known))}")
+
+
+def _answered(channels: Iterable[Channel], answers: Mapping[str, str]) -> Iterator[Channel]:
+    """Channels with the units that were answered, less those left aside."""
+    for channel in channels:
+        answer = answers.get(channel.name, answers.get(channel.sensor))
+        if answer is None:
+            yield channel
+        elif answer != ASIDE:
+            unit = parse_unit(answer, f"--answer {channel.sensor}")
+            if problem := misfit(channel.name, unit, channel.increment):
+                raise InputError(f"--answer {channel.sensor}", problem)
+            yield replace(channel, unit=unit, grade="certain", because="as answered", question="")
+
+
+def _in_words(channels: list[Channel]) -> str:
+    """Channels of one sensor in a line."""
+    columns = ", ".join(
+        json.dumps(list(channel.origin) if isinstance(channel.origin, tuple) else channel.origin)
+        for channel in channels
+    )
+    first = channels[0]
+    unit = f" in {first.unit.symbol}" if needs_unit(first.name) else ""
+    return f"column{'s' if len(channels) > 1 else ''} {columns}{unit}, {first.grade}: {first.because}"
 
 
 def read_map(path: str | Path) -> RecordMap:
@@ -273,7 +236,14 @@ def read_map(path: str | Path) -> RecordMap:
 
     Raises `MapError`, naming the key, what was found and what was expected.
     """
-    data = read_toml(path, MapError)
+    return map_of(read_toml(path, MapError), path)
+
+
+def map_of(data: dict[str, Any], path: str | Path, written: bool = True) -> RecordMap:
+    """A parsed map, of the file ``path`` or, not ``written``, of the recording there that it was recognised from.
+
+    Raises `MapError`.
+    """
     if data.keys() & {"site", "rig", "imu"} and not data.keys() & {"columns", "file"}:
         raise MapError(path, "found a study, which goes behind --study, expected a column map")
     table = data.get("file")
@@ -284,42 +254,28 @@ def read_map(path: str | Path) -> RecordMap:
     entry = check(MapEntry, data, path, MapError)
     if not entry.columns and not named:
         raise MapError(path, "columns: missing, expected at least one [columns.NAME] or [file.NAME]")
-    plain = (FileShare(_channels(entry.columns, path), _options(entry.file)),) if entry.columns else ()
+    of_t = entry.time.of_t
+    plain = (FileShare(_channels(entry.columns, path, of_t), entry.file.laid_out),) if entry.columns else ()
     rate, rate_u = _rate(entry.time, path)
-    parts = (*plain, *(_part(name, named[name], path) for name in named))
+    parts = (*plain, *(_part(name, named[name], path, of_t) for name in named))
     files = sorted({Path(part.path) for part in parts if part.name})
     if len({file.name for file in files}) < len(files):
         names = ", ".join(map(str, files))
         raise MapError(path, f"file: found one file name in two folders in {names}, expected distinct ones")
-    return RecordMap(Path(path), parts, rate, entry.time.ignore, rate_u)
+    return RecordMap(Path(path), parts, rate, entry.time.ignore, rate_u, written)
 
 
-def _part(name: str, table: Mapping[str, Any], path: object) -> FileShare:
+def _part(name: str, table: Mapping[str, Any], path: object, of_t: TimeForm | None) -> FileShare:
     """One ``[file.NAME]``."""
     where = f"{path}: file.{name}"
     entry = check(NamedFileEntry, table, where, MapError)
-    return FileShare(_channels(entry.columns, where), _options(entry), name, entry.path)
-
-
-def _options(entry: FileEntry) -> FileOptions:
-    """The layout as the readers take it."""
-    return FileOptions(
-        entry.delimiter,
-        entry.decimal,
-        entry.comment,
-        entry.skip,
-        entry.variable,
-        entry.transpose,
-        tuple(entry.types),
-        tuple(entry.fields),
-        entry.frame,
-    )
+    return FileShare(_channels(entry.columns, where, of_t), entry.laid_out, name, entry.path)
 
 
 def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:
     """The stated sample rate [Hz], and its relative standard uncertainty."""
     where = f"{path}: time.rate"
-    if entry.rate is None:
+    if entry.rate is None or entry.rate.strip() == OPEN:
         if entry.ignore:
             raise MapError(where, 'missing, expected a rate such as "100 Hz" where time.ignore = true')
         return None, 0.0
@@ -329,11 +285,14 @@ def _rate(entry: TimeEntry, path: object) -> tuple[float | None, float]:
     return rate.value, rate.u / rate.value
 
 
-def _channels(columns: Mapping[str, ColumnEntry], where: object) -> tuple[Channel, ...]:
-    """The channels of a ``columns`` table, names and units checked."""
-    return tuple(
+def _channels(
+    columns: Mapping[str, ColumnEntry], where: object, of_t: TimeForm | None
+) -> tuple[Channel, ...]:
+    """The channels of a ``columns`` table, names and units checked; the time has stamps ``of_t``."""
+    channels = [
         _channel(name, entry, f"{where}: columns.{shown(name)[1:-1]}") for name, entry in columns.items()
-    )
+    ]
+    return tuple(replace(each, stamps=of_t) if each.name == "t" else each for each in channels)
 
 
 def _channel(name: str, entry: ColumnEntry, where: str) -> Channel:
@@ -347,4 +306,5 @@ def _channel(name: str, entry: ColumnEntry, where: str) -> Channel:
     problem = misfit(name, unit, increment)
     if problem:
         raise MapError(f"{where}.unit", problem)
-    return Channel(name, entry.origin, unit, entry.sign * entry.scale, increment)
+    said = entry.grade or "", entry.because, entry.question
+    return Channel(name, entry.origin, unit, entry.sign * entry.scale, increment, *said)

@@ -30,7 +30,8 @@ class Record:
     and are listed in ``findings``. Columns of files with different clocks keep their own time axes. ``labels`` holds
     the text of a label column (one string a row), if the map names one. ``span`` says what part of the sources it is,
     as ``begin_s`` and ``end_s`` from the first stamp of each clock; empty for all. ``rate_u`` is the relative standard
-    uncertainty of a sample rate that was typed, 0 if it had none; None where stamps are the clock.
+    uncertainty of a sample rate that was typed, 0 if it had none; None where stamps are the clock. ``taken`` says of
+    each sensor that was recognised which columns it is in, in which unit, how sure that is, and why.
     """
 
     columns: Mapping[str, Column]
@@ -39,6 +40,7 @@ class Record:
     labels: tuple[str, ...] = ()
     span: Mapping[str, float] = field(default_factory=dict)
     rate_u: float | None = None
+    taken: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Ten lines at most: columns by clock with units and rows, and the findings."""

@@ -9,6 +9,7 @@ from inercal.foundation.errors import QuantityError, RecordError
 from inercal.foundation.records.channels import Channel, Origin, is_channel, misfit, needs_unit
 from inercal.foundation.records.places import counted_names, shortened
 from inercal.foundation.records.read.limits import TITLE
+from inercal.foundation.records.recognise.words import said
 from inercal.foundation.units import Unit, parse_unit, shown
 
 EXAMPLE = '"t [s],acc_x [m/s^2],gyro_x [deg/s]"'
@@ -63,18 +64,13 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
     return tuple(channels.values())
 
 
-_SENSORS = {
+#: sensors of rigs -> names; those of an instrument are told by `inercal.foundation.records.recognise.words`
+_OF_RIGS = {
     "wc": r"wc|(?:cmd|command|commanded)(?: (?:rate|angular rate|omega|w))?",
     "th": r"th|theta|gimbal|gimbal angle|encoder|encoder angle|enc",
-    "acc": r"a|f|ac|acc|accel|accelerometer|acceleration|linear acceleration|specific force|alpha|beschl"
-    r"|beschleunigung",
-    "gyro": r"g|w|gy|gyr|gyro|gyroscope|angular velocity|angular rate|omega|drehrate",
 }
-_TIME = (
-    r"(?:t|time|zeit)(?: (?:acc|gyro))?|timestamp|time stamp|stamp|ts|sec|secs|seconds|millis|micros"
-    r"|elapsed(?: time)?"
-)
 #: channels of a model that pitches -> names
+_ACCELEROMETER = r"a|f|acc|accel|accelerometer|acceleration"
 _OF_A_MODEL = (
     (
         "theta_ref",
@@ -101,13 +97,6 @@ _OF_A_TABLE = (
     ("y_y", r"(?:out|output|reading|signal) y"),
 )
 _LABEL = r"label|part|section|pose"
-_SPELLED = {
-    "m/s^2": "m_s2|mps2|ms2|m_s_2",
-    "rad/s": "rad_s|radps",
-    "mdeg/s": "mdeg_s",
-    "deg/s": "deg_s|degps",
-}
-_BY_DIMENSION = {"acceleration": "acc", "rate": "gyro", "temperature": "temperature", "time": "t"}
 
 
 def titled(title: str, given: str | None = None) -> tuple[str | None, str | None]:
@@ -125,19 +114,18 @@ def titled(title: str, given: str | None = None) -> tuple[str | None, str | None
         return None, None
     match = re.fullmatch(r"(.*?)\s*(?:[\[(](?!\d+[\])])(.*)[\])])?", title.strip())
     plain, unit = (match[1], match[2] or given) if match else (title, given)
-    name = _named(plain)
-    if unit is None:
+    name = plain if is_channel(plain) else _of_rig(plain)
+    if name is None and unit is None:
         stem, _, suffix = plain.replace(" ", "_").rpartition("_")
-        for spelled, texts in _SPELLED.items():
-            if parts := re.fullmatch(rf"(.+)_(?:{texts})", plain):
-                stem, suffix = parts[1], spelled
-        if (meant := _named(stem)) and fits(meant, suffix):
+        if (meant := stem if is_channel(stem) else _of_rig(stem)) and fits(meant, suffix):
             return meant, suffix
-        return name, None
-    measured = _known(unit)
-    if measured is None or (name is not None and misfit(name, measured) is None):
+    if name is not None and (unit is None or not _known(unit) or fits(name, unit)):
         return name, unit
-    return _by_unit(plain, measured), unit
+    words = said(plain, unit)
+    sensor = words.sensor if not words.never else ""
+    if sensor in ("acc", "gyro") and words.axis:
+        return f"{sensor}_{words.axis}", unit or words.unit or None
+    return ("t", unit or words.unit or None) if sensor == "t" else (None, unit)
 
 
 def numbered(title: str) -> str | None:
@@ -145,7 +133,7 @@ def numbered(title: str) -> str | None:
     if len(title) > TITLE:
         return None
     match = re.fullmatch(
-        rf"(?:.* )?(?:{_SENSORS['acc']}) ?([1-9]\d*)", _words(re.sub(r"\s*[\[(].*", "", title))
+        rf"(?:.* )?(?:{_ACCELEROMETER}) ?([1-9]\d*)", _words(re.sub(r"\s*[\[(].*", "", title))
     )
     return f"a{match[1]}" if match else None
 
@@ -192,31 +180,18 @@ def _known(unit: str) -> Unit | None:
         return None
 
 
-def _by_unit(plain: str, unit: Unit) -> str | None:
-    """The channel of a quantity, by the axis in the name."""
-    sensor = _BY_DIMENSION.get(unit.dimension)
-    if sensor not in ("acc", "gyro"):
-        return sensor
-    axes = re.findall(r"(?:(?<=[^a-z])|^(?:acc|gyro|a|f|g|w)?)([xyz123])(?![a-z0-9])", _words(plain))
-    return f"{sensor}_{axes[-1].translate(str.maketrans('123', 'xyz'))}" if axes else None
-
-
-def _named(title: str) -> str | None:
-    """The channel a name stands for, if any."""
-    if is_channel(title):
-        return title
+def _of_rig(title: str) -> str | None:
+    """The channel of a rig, or other than of a sensor, that a name stands for, if any."""
     words = _words(title)
     if angle := re.fullmatch(r"phi ?([123])", words):
         return f"phi{angle[1]}"
-    for sensor, names in _SENSORS.items():
-        match = re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz])(?: (?:{names})|{sensor})", words)
-        if match:
+    for sensor, names in _OF_RIGS.items():
+        if match := re.fullmatch(rf"(?:.* )?(?:{names}) ?([xyz])|([xyz])(?: (?:{names})|{sensor})", words):
             return f"{sensor}_{match[1] or match[2]}"
     if axis := re.fullmatch(r"(?:.* )?a([1-9]\d*)|a ([1-9]\d*)", words):
         return f"a{axis[1] or axis[2]}"
     for channel, names in (
         *_OF_A_MODEL,
-        ("t", _TIME),
         ("label", _LABEL),
         ("temperature", r"temp|tmp|temperature|temperatur"),
         ("position", "position"),

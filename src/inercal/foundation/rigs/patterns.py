@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -110,16 +110,21 @@ def _of_density(cumulative: Array, grid: Array, p: Array) -> Array:
     return np.asarray(np.interp(p * cumulative[-1], cumulative, grid))
 
 
+#: nodes and weights by their number
+_legendre = cache(np.polynomial.legendre.leggauss)
+_hermite = cache(np.polynomial.hermite_e.hermegauss)
+
+
 def uniform(half_width: float) -> Distribution:
     """Uniform on ±``half_width``."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _legendre(NODES)
     half = _positive(half_width)
     return Distribution("uniform", half, half * nodes, 0.5 * weights, partial(_of_uniform, half))
 
 
 def normal(std: float) -> Distribution:
     """Normal with mean zero and standard deviation ``std``."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    nodes, weights = _hermite(NODES)
     sigma = _positive(std)
 
     return Distribution("normal", sigma, sigma * nodes, weights / weights.sum(), partial(_of_normal, sigma))
@@ -129,7 +134,7 @@ def triangular(half_width: float) -> Distribution:
     """Symmetric triangular on ±``half_width``: the sum of two equal uniform errors."""
     half = _positive(half_width)
 
-    x, w = np.polynomial.legendre.leggauss(NODES // 2)
+    x, w = _legendre(NODES // 2)
     up = 0.5 * (x + 1.0)  # 0 to 1, on either side of the peak
     nodes, weights = np.concatenate([-up[::-1], up]), 0.5 * w * (1.0 - up)
     weights = np.concatenate([weights[::-1], weights])
@@ -159,7 +164,7 @@ def density(pdf: Callable[[Array], ArrayLike], low: float, high: float) -> Distr
     """
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ValueError(f"found the interval {low:g} to {high:g}, expected two finite ends in order")
-    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = _legendre(NODES)
     nodes = 0.5 * (low + high) + 0.5 * (high - low) * x
     grid = np.linspace(low, high, 4097)
     mass, steps = (np.broadcast_to(np.asarray(pdf(at), dtype=float), at.shape) for at in (nodes, grid))

@@ -10,7 +10,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from inercal.faces.studies.commented import commented
 from inercal.faces.studies.common import ConditionsTable
 from inercal.faces.studies.fields import refusal
 from inercal.faces.studies.laboratory import (
@@ -23,10 +22,11 @@ from inercal.faces.studies.laboratory import (
     Tolerances,
 )
 from inercal.faces.studies.load import put
-from inercal.faces.studies.schema import TomlSchema
+from inercal.faces.studies.schema import TomlSchema, commented
 from inercal.faces.studies.starting import UNKNOWN
 from inercal.foundation._toml import Strict, check, read_toml
 from inercal.foundation.errors import InputError
+from inercal.foundation.keys import in_place_of
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import shown
 from inercal.laboratory.certificate.elements import plain
@@ -263,8 +263,8 @@ def sources_known(
     for name, table in equipment.items():
         for source in table.budget:
             if source not in sources:
+                expected = in_place_of("budget", source) or "expected a source of the budget"
                 raise InputError(
                     where,
-                    f"equipment.{name}.budget: found {shown(source)}, expected a source of the budget: "
-                    f"{', '.join(sorted(sources))}",
+                    f"equipment.{name}.budget: found {shown(source)}, {expected}: {', '.join(sorted(sources))}",
                 )

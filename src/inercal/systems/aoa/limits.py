@@ -273,6 +273,9 @@ class Limits:
     settling_time: float = 2.0
     """Time [s] after the first row from which innovations and errors are judged."""
 
+    roll_u: float = math.radians(0.1)
+    """Standard uncertainty [rad] of a roll at the start that is stated without one, where it is estimated."""
+
     level_cosine: float = 0.1
     """Cosine of the roll below which gyro and axes across the body do not show pitch."""
 
@@ -284,6 +287,9 @@ class Limits:
 
     reference_sigmas: float = 2.0
     """Standard uncertainties of the angle by which a late reference differs, to be named."""
+
+    reference_off: float = 4.0
+    """Root mean square of what a reference differs from the angle, over u, beyond which it is judged."""
 
     reference_spans: int = 50
     """Averages of 50 ms that a reference angle has at least for a fit of the sensors."""

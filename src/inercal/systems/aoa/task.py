@@ -32,7 +32,7 @@ from inercal.systems.aoa.result.carry_over import load as load_posterior
 from inercal.systems.aoa.result.columns import beyond_limits
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
 from inercal.systems.aoa.result.points import Point, points
-from inercal.systems.aoa.result.verification import Errors, errors, late_reference
+from inercal.systems.aoa.result.verification import Errors, contradicting_reference, errors
 from inercal.systems.aoa.settings import AoaSettings
 
 
@@ -139,7 +139,7 @@ def measure(
         judged = {found.method: errors(recording, found) for found in (angles, *compared.values())}
         verified = _fitted(recording, settings, at_rest)
         if filtered is not None:
-            findings = [*findings, *late_reference(recording, angles)]
+            findings = [*findings, *contradicting_reference(recording, angles)]
     behind = (findings, delay, at_rest, judged, compared, verified)
     if filtered is None:
         estimate = assemble_angles(recording, settings, angles, *behind)

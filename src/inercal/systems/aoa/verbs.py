@@ -15,8 +15,8 @@ from inercal.foundation.records.read import source_of
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate
 from inercal.systems.aoa import task
-from inercal.systems.aoa.result.balance import Joined, read_balance
-from inercal.systems.aoa.result.balance import join as joining
+from inercal.systems.aoa.result.points import Joined, read_balance
+from inercal.systems.aoa.result.points import join as joining
 
 if TYPE_CHECKING:
     from inercal.faces.report.html import Picture

@@ -7,12 +7,10 @@ from typing import TypeAlias
 from inercal.faces.report.html import Picture, render
 from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.aided.figures import pictures as of_aided
-from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
-from inercal.systems.imu.ferraris.figures import pictures as of_ferraris
 from inercal.systems.imu.sections.figures import pictures as of_sections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-AnyCalibration: TypeAlias = FerrarisCalibration | AidedCalibration | CalibrationFromSections
+AnyCalibration: TypeAlias = AidedCalibration | CalibrationFromSections
 
 
 def main(calibration: AnyCalibration) -> Picture:
@@ -23,8 +21,6 @@ def main(calibration: AnyCalibration) -> Picture:
 def pictures(calibration: AnyCalibration) -> list[Picture]:
     """All pictures of a calibration of any status, the main one first."""
     match calibration:
-        case FerrarisCalibration():
-            return of_ferraris(calibration)
         case AidedCalibration():
             return of_aided(calibration)
         case CalibrationFromSections():

@@ -58,6 +58,9 @@ class Limits:
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 
+    k2_probability: float = 5e-4
+    """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
+
     clipped_part: float = 0.1
     """Part of the samples of a pose at the end of an accelerometer's range from which its mean counts as short."""
 
@@ -119,9 +122,6 @@ class Limits:
 
     faint_response: float = 0.3
     """Least part of an output's largest response that a position or a turn has to show on its axis."""
-
-    position_tilt: float = math.radians(10.0)
-    """Scatter of the positions [rad] beyond which the sections can hardly be what their names say."""
 
     # Ferraris: choice of the turns
 
@@ -253,6 +253,9 @@ class Limits:
     hysteresis_probability: float = 0.01
     """Probability at which chance alone makes passes of any of the channels differ."""
 
+    judged_rows: int = 1000
+    """Rows of each sensor that are judged at most: those of longer records are summed."""
+
     # aided by a table: its diagnosis; shares of an output are of its variation over the test
 
     misfit_risk: float = 2.5e-5
@@ -269,9 +272,6 @@ class Limits:
 
     told_share: float = 1e-3
     """Share of a pattern that the other unknowns have to leave for it to be told from them."""
-
-    short_share: float = 0.01
-    """Share of the largest input by which an output has to fall short to be called saturated."""
 
     smoothing_step: float = 0.05
     """Step [s] of the second derivatives with time by which a slow filter is seen."""

@@ -1,4 +1,4 @@
-"""Samples of a recording: on another clock, their steps, the ends of their range, and units that cannot be."""
+"""Samples of a recording: their steps, and the ends of their range."""
 
 from __future__ import annotations
 
@@ -6,18 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.column import Triad
-from inercal.foundation.units import RAW
-
-
-def on_other_clock(values: Array, t: Array, other: Array) -> Array:
-    """Values at the nearest sample of another time axis; infinite outside."""
-    nearest = np.clip(np.searchsorted(t, other), 0, len(t) - 1)
-    out = values[nearest]
-    out[(other < t[0]) | (other > t[-1])] = np.inf
-    return out
 
 
 def coarse_steps(values: Array, deviation: Array) -> Array:
@@ -34,17 +24,3 @@ def coarse_steps(values: Array, deviation: Array) -> Array:
 def clipped_rows(gyro: Triad) -> NDArray[np.bool_]:
     """Rows (n,) in which an axis saturates."""
     return np.asarray(np.any([at_ends(values) for values in gyro.values.T], axis=0))
-
-
-def unit_words(triad: Triad, model: TriadModel) -> str:
-    """A wrong unit of physical outputs, in words, by scale factors far from nominal; empty if they are near."""
-    if triad.unit.dimension in RAW:
-        return ""
-    nominal = 1.0 / triad.unit.factor
-    ratio = float(np.median(model.scale) / nominal)
-    if 0.5 < ratio < 2.0:
-        return ""
-    return (
-        f"the scale factors of {triad.sensor} are {ratio:.3g} times those of outputs in {triad.unit.symbol}: check "
-        f"the unit{' and the time stamps' if triad.sensor == 'gyro' else ''} in the map or header"
-    )

@@ -7,17 +7,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
-from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, within
+from inercal.foundation.keys import FREQUENCY, RATE, RELATIVE_U, TIME, Bounds, option, quantity, table, within
 from inercal.foundation.rigs.chain import Chain
+from inercal.foundation.rigs.stated import StatedRig
 from inercal.foundation.units import Quantity
 
-MASKED = ("saturation",)
+MASKED = ("saturation", "no_data")
 """Codes of a recording's findings whose samples no fit uses: turns in which a sensor saturates are left out."""
 
 COMMAND = "calibrate imu"
@@ -63,6 +65,38 @@ class FerrarisSettings:
         bounds=TILT,
     )  # fmt: skip
     sections: Mapping[str, tuple[float, float] | str] = field(default_factory=dict)
+
+
+SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+
+
+@dataclass(frozen=True)
+class AidedRig:
+    """Reference-aided calibration: the table, and the instrument on it."""
+
+    stated_rig: StatedRig | None = table(
+        "the table, as in a study of a turntable; of two axes and without errors if absent, its azimuth unknown "
+        "unless given", None, name="rig",
+    )  # fmt: skip
+    mounting: tuple[SignedAxis, SignedAxis, SignedAxis] = option(
+        "axes of the table, at zero angles, along which the instrument's x, y and z point", ("+x", "+y", "+z"),
+        example=["+x", "+y", "+z"],
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse axes that make no frame, and ranges, which would change nothing."""
+        if mounting_of(self.mounting) is None:
+            axes = ", ".join(self.mounting)
+            raise InputError(
+                "", f"found the mounting {axes}, expected three axes that make a right-handed frame"
+            )
+        if self.rig.limits.stated:
+            raise InputError("", "found rig.limits, expected none: the angles are those of the record")
+
+    @property
+    def rig(self) -> StatedRig:
+        """The table; a plain one of two axes where none is stated."""
+        return self.stated_rig or StatedRig("two_axis_turntable")
 
 
 @dataclass(frozen=True)
@@ -130,12 +164,18 @@ class SectionsSettings:
         Tables ``[[imu.section]]`` of the study, as typed.
     placing, level
         As their keys say [rad].
+    misalignment : float or None
+        Standard deviation of M and T about 0 [rad]; as usual if absent.
+    mounting_u : float
+        Standard uncertainty of the case against directions and axes [rad].
     """
 
     table: Path | None = None
     rows: tuple[Mapping[str, object], ...] = ()
     placing: float | None = None
     level: float | None = None
+    misalignment: float | None = None
+    mounting_u: float = 0.0
 
 
 Method: TypeAlias = (
@@ -151,25 +191,30 @@ Method: TypeAlias = (
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulated recording: by hand from pose to pose, in six positions and three turns, or on a table.
+    """A simulated recording: sections one after the other, by hand from pose to pose, or on a table.
 
     Biases wander with a correlation time of 100 s. ``coefficients`` are true values by symbol, in counts and SI.
     """
 
     poses: int = option(
-        "of multiposition: held one after the other, the first level", 24, least=4, most=1000,
-        kinds=("multiposition",),
+        "of multiposition, and of sections that nothing states: held one after the other, the first level", 24,
+        least=4, most=1000, kinds=("multiposition", "sections"),
     )  # fmt: skip
     start: float = quantity(
         "length of the first hold, or rest of the table",
         "time",
         "30 s",
         bounds=TIME,
-        kinds=("multiposition", "aided"),
+        kinds=("multiposition", "aided", "sections"),
     )
     hold: float = quantity("length of each other hold, position or rest", "time", "3 s", bounds=TIME)
     turning: float = quantity("length of each turn; of the table, by 90 deg", "time", "3 s", bounds=TIME)
     sample_rate: float = quantity("samples per second", "frequency", "100 Hz", bounds=FREQUENCY)
+    means: bool = option(
+        "of sections that are rests: a row of mean outputs for each in the place of samples",
+        False,
+        kinds=("sections",),
+    )
     accelerometer_noise: float = quantity(
         "white noise of the accelerometers", "velocity random walk", "80 ug/sqrt(Hz)", bounds=NOT_NEGATIVE
     )
@@ -191,7 +236,7 @@ class Disturbances:
 
     restless_start: float = quantity(
         "standard deviation of a tremble of the attitude in the first hold, as of an IMU in the hand", "angle",
-        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE, kinds=("multiposition", "ferraris"),
+        "0 deg", example="0.2 deg", bounds=NOT_NEGATIVE, kinds=("multiposition", "ferraris", "sections"),
     )  # fmt: skip
     knocks: int = option("turns in which the instrument is knocked", 0, least=0, most=1000)
     knock: float = quantity("angle by which the gyro is wrong after a knock", "angle", "1 deg")
@@ -203,8 +248,9 @@ class Disturbances:
         bounds=within(-0.5, 0.5, "within 50 %"),
     )  # fmt: skip
     lever_arm: float = quantity(
-        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes", "length",
-        "0 mm", example="50 mm", bounds=NOT_NEGATIVE, kinds=("aided",),
+        "of aided: standard deviation of the places of the accelerometers beside the crossing of the axes; of sections "
+        "that of all of them beside the axis", "length", "0 mm", example="50 mm", bounds=NOT_NEGATIVE,
+        kinds=("aided", "sections"),
     )  # fmt: skip
     delay: float = quantity(
         "of aided: time by which the angles of the table come late", "time", "0 ms", example="20 ms",
@@ -236,6 +282,8 @@ class ImuSettings:
         Local gravity and what it is uncertain by.
     static_start, g_sensitivity, time_base_u
         As their keys say.
+    g_sensitivity_u : float or None
+        Of sections: its standard deviation about 0 [(rad/s)/(m/s^2)]; as usual for such gyros if absent.
     k2 : bool
         Second-order coefficients of the accelerometers are estimated.
     k2_u : float or None
@@ -262,8 +310,9 @@ class ImuSettings:
     g_sensitivity: bool = option(
         "also estimate how the gyro's drift depends on specific force",
         False,
-        kinds=("multiposition", "aided"),
+        kinds=("multiposition", "aided", "sections"),
     )
+    g_sensitivity_u: float | None = None
     k2: bool = False
     k2_u: float | None = None
     time_base_u: float = quantity(

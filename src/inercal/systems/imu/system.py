@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inercal.systems.contract import Channels, System
+from inercal.systems.contract import Channels, OfferedDesign, System
 
 if TYPE_CHECKING:
     import numpy as np
@@ -65,6 +65,12 @@ def _simulate(study: Study, rng: np.random.Generator) -> Record:
     return simulate(study, rng)
 
 
+def _design(study: Study) -> Result:
+    from inercal.systems.imu.verbs import design
+
+    return design(study)
+
+
 def _stream(settings: ImuSettings, interval: float, say: Say, say_finding: SayFinding) -> Make:
     from inercal.faces.stream.estimators import monitor
 
@@ -91,6 +97,7 @@ SYSTEM = System(
     counted=_counted,
     calibrate=_calibrate,
     simulate=_simulate,
+    designs={"sections": OfferedDesign(_design)},
     stream=_stream,
     streams="rest and noise",
     converts=True,

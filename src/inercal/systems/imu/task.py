@@ -26,10 +26,9 @@ from inercal.systems.imu.settings import (
 
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
-    from inercal.systems.imu.ferraris.calibration import FerrarisCalibration
     from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-    Calibrated = FerrarisCalibration | AidedCalibration | CalibrationFromSections
+    Calibrated = AidedCalibration | CalibrationFromSections
 
 
 def in_order(settings: ImuSettings) -> bool:
@@ -137,7 +136,7 @@ def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:
 
 
 def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
-    """A simulated record of the study: an IMU held by hand in one pose after the other, or as its method asks for.
+    """A simulated record of the study: an IMU in its sections, in one pose after the other, or as its method asks for.
 
     Coefficients that the study does not state are drawn.
 
@@ -151,6 +150,12 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
     match settings.method:
         case None:
             return _by_hand(settings, settings.site.latitude, rng)
+        case SectionsSettings(table=None, rows=()):
+            return _by_hand(settings, settings.site.latitude, rng)
+        case SectionsSettings():
+            from inercal.systems.imu.sections.simulate import simulate_sections
+
+            return simulate_sections(settings, settings.method, settings.site.latitude, rng)[0]
         case FerrarisSettings():
             from inercal.systems.imu.ferraris.simulate import simulate_study as simulate_session
 
@@ -160,7 +165,8 @@ def simulate(settings: ImuSettings, rng: np.random.Generator) -> Record:
 
             return simulate_table(settings, settings.method, rng)
     raise StudyError(
-        "imu.method", 'found another method, expected "multiposition", "ferraris" or "aided" for a simulation'
+        "imu.method",
+        'found another method, expected "sections", "multiposition", "ferraris" or "aided" for a simulation',
     )
 
 

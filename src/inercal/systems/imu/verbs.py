@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inercal.faces.python.result import Result, of_coefficients
-from inercal.faces.python.study import Progress, Study, of_files, of_runs
+from inercal.faces.python.result import Result, View, of_coefficients
+from inercal.faces.python.study import Progress, Study, designed_by, of_files, of_runs
+from inercal.foundation.errors import StudyError
 from inercal.foundation.records.record import Record
+from inercal.systems.imu.settings import SectionsSettings
 from inercal.systems.imu.task import calibrate as calibrate_run
 from inercal.systems.imu.task import calibrate_files, in_order
 
 if TYPE_CHECKING:
+    from inercal.faces.report.html import Picture
+    from inercal.systems.imu.sections.design import DesignedSections
     from inercal.systems.imu.task import Calibrated
     from inercal.systems.imu.temperature.model import TemperatureModel
 
@@ -48,6 +52,36 @@ def simulate(study: Study, rng: np.random.Generator) -> Record:
 
     with study.at_fault():
         return task.simulate(study.settings, rng)
+
+
+def design(study: Study) -> Result:
+    """Say what the sections of a study would tell, and which one more would help most; ``evidence`` is the
+    `inercal.systems.imu.sections.design.DesignedSections`."""
+    from inercal.faces.report.html import render
+    from inercal.systems.imu.sections import figures
+    from inercal.systems.imu.sections.design import REFERENCES
+    from inercal.systems.imu.sections.design import design as judge
+
+    settings = study.settings
+    options = SectionsSettings() if settings.method is None else settings.method
+
+    def judged() -> DesignedSections:
+        if not isinstance(options, SectionsSettings):
+            raise StudyError("imu.method", "found another method, expected sections to judge")
+        return judge(settings, options)
+
+    designed, result = designed_by("design sections", study, judged, REFERENCES)
+
+    def picture() -> Picture:
+        return figures.foretold(designed)
+
+    def page() -> str:
+        return render(result, [picture()], "Sections of an IMU before the test", (), designed.tables())
+
+    def tables() -> list[str]:
+        return [f"{table.title}\n{table.text()}" for table in designed.tables()]
+
+    return Result(result, View(result, designed.message, tables, page, picture), designed)
 
 
 def of_temperature(model: TemperatureModel) -> Result:

@@ -13,6 +13,13 @@ class Limits:
     risk: float = 1e-3
     """Accepted probability of a false finding, of each kind."""
 
+    question_risk: float = 1e-2
+    """Accepted probability that any question of the judge names something in a sound recording; the real one is near it
+    for a filter."""
+
+    place_turn: float = math.radians(10.0)
+    """Turn [rad] of a joint from which readings are asked whether they depend on its angle."""
+
     gross_faults: int = 4
     """Gross faults that are looked for, one after the other."""
 
@@ -66,6 +73,9 @@ class Limits:
 
     search_turn: float = math.radians(3.0)
     """Turn [rad] between two rows, at most, while a path is searched for."""
+
+    last_step: float = 0.02
+    """Part of u that the last step of a fit of several records may be; beyond it the fit has not converged."""
 
     second_prior: float = 10.0
     """Standard uncertainties of the first pass of a filter that make the prior of its second one: so far from where it
@@ -182,6 +192,12 @@ class Limits:
 
     block_turn: float = math.radians(20.0)
     """Turn [rad] within a block of rows, at most."""
+
+    summed_turn: float = math.radians(2.0)
+    """Turn [rad] over which whitened innovations are summed for the judge: no course changes by more than 2 %."""
+
+    summed_time: float = 60.0
+    """Time [s] over which they are summed at rest."""
 
     sway_bands: int = 100
     """Bands of frequency, in one of which the sway of a base lies."""

@@ -18,7 +18,6 @@ from inercal.foundation.computing.runs import run
 from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.rotations import boxminus, conjugate
 from inercal.systems.selfcal.before.bounds import BAYESIAN_BOUNDS, bounds
-from inercal.systems.selfcal.before.simulate import Experiment, SimulatedPlatform, experiment, simulate
 from inercal.systems.selfcal.estimators import FilterKind
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem
@@ -27,6 +26,7 @@ from inercal.systems.selfcal.find_base import stated_well
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
 from inercal.systems.selfcal.settings import SelfcalSettings
+from inercal.systems.selfcal.simulate import Experiment, SimulatedPlatform, experiment, simulate
 
 if TYPE_CHECKING:
     from inercal.foundation.inference.consistency import Coverage, Nees

@@ -22,13 +22,13 @@ from inercal.foundation.keys import (
     table,
     within,
 )
-from inercal.foundation.units import Quantity, parse_quantity
+from inercal.foundation.units import Quantity
 from inercal.systems.selfcal.disturbances import Disturbances
 from inercal.systems.selfcal.estimators import FactorKind, FilterKind
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.joint_limits import JointLimits
 from inercal.systems.selfcal.platform.plan import PlatformPlan
-from inercal.systems.selfcal.platform.rig import JOINTS, Base, Gimbals, World, world
+from inercal.systems.selfcal.platform.rig import JOINTS, LEANING, Base, Gimbals, World, world
 from inercal.systems.selfcal.platform.states import (
     ALL,
     EXTENDED_MODEL,
@@ -116,8 +116,13 @@ class Gating:
     ``stops``: the ``accelerometers`` or the whole ``step`` of update. Angles in rad.
     """
 
-    rule: Literal["any", "two", "channel"]
-    stops: Literal["accelerometers", "step"] = "accelerometers"
+    rule: Literal["off", "any", "two", "channel"] = option(
+        "near-level gating: stop where any accelerometer is near level, where two are, or each by itself", "off",
+        name="gating",
+    )  # fmt: skip
+    stops: Literal["accelerometers", "step"] = option(
+        "what gating stops: the accelerometers, or the whole update", "accelerometers", name="gating_stops"
+    )
     near: float = float(np.radians(2.0))
     far: float = float(np.radians(5.0))
 
@@ -169,6 +174,20 @@ class Search:
         "beside the bound", (), example=["k2", "harmonics"],
     )  # fmt: skip
     seed: int = option("of the random starts", 1, least=0)
+
+
+@dataclass(frozen=True)
+class PlacedRecord:
+    """A record of a platform on a base of its own; several are fitted together."""
+
+    file: str = option("of the record, as the command is given it", example="south.csv", least=1)
+    heading: float | None = quantity(
+        "of the base, from north to east; that of [rig] if absent", "angle", example="40 deg", words={"unknown": 0.0}
+    )  # fmt: skip
+    tilt: tuple[float, float] | None = quantity(
+        "of the base, about north and about east; that of [rig] if absent", "angle",
+        example=["0 arcmin", "0 arcmin"], of="the one about north, the one about east", bounds=LEANING,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,11 +294,7 @@ class SelfcalSettings:
     @property
     def priors(self) -> Array:
         """(K,) standard deviations of the full vector, those of the rig as stated or usual."""
-        usual = [
-            parse_quantity(state.prior, state.dimension, kind).value
-            for kind, state in STATES.items()
-            for _ in state.parameters
-        ]
+        usual = [state.usual for state in STATES.values() for _ in state.parameters]
         whole = np.append(self.prior, usual[len(self.prior) :])
         whole[WALK : WALK + 3] = self.noise.gyro_walk_sigma
         whole[WALK + 3 :] = self.noise.accelerometer_walk_sigma

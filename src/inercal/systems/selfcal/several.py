@@ -36,6 +36,7 @@ from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, r
 from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.observability import Observability, observability
+from inercal.systems.selfcal.diagnosis.passed import pass_of
 from inercal.systems.selfcal.estimators import ESTIMATORS
 from inercal.systems.selfcal.filters import run as filtering
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem
@@ -53,8 +54,6 @@ from inercal.systems.selfcal.task import Calibration, based, calibrate
 _ROUNDS = 8
 """Steps of Gauss-Newton at most."""
 
-_NEAR = 0.02
-"""Part of u that the last step may be."""
 
 _OF_ONE = ("at_prior", "goal_missed", "stated_exact", "considered")
 """Findings of a record alone that need not hold for all together."""
@@ -159,10 +158,10 @@ def fit(parts: Sequence[RecordPart]) -> RecordFit:
         u = np.sqrt(np.diag(covariance))
         size = float(np.max(np.abs(step) / u))
         about, x, width = x, x + step, np.minimum(prior, LIMITS.second_prior * u)
-        if not size > _NEAR:
+        if not size > LIMITS.last_step:
             break
     names = tuple(name for name, each in zip(states, common, strict=True) if each)
-    found = RecordFit(names, common, x, covariance, prior, said, size <= _NEAR, "")
+    found = RecordFit(names, common, x, covariance, prior, said, size <= LIMITS.last_step, "")
     return found._replace(apart=_contradiction(found, about, mean) if found.converged else "")
 
 
@@ -294,8 +293,11 @@ def _besides(
         own = filtering.estimate(part.recording, part.problem, courses=False)
         known = np.sqrt(np.diag(own.covariance))
         known[fit.common] = u
-        of_site, of_site_exact = systematic(part.recording, part.settings, own, known)
-        of_rig, of_rig_exact = considered(part.recording, part.settings, own, known)
+        passed = pass_of(part.recording, part.problem, own)
+        if passed is None:
+            continue
+        of_site, of_site_exact = systematic(passed, part.settings, known)
+        of_rig, of_rig_exact = considered(passed, part.settings, known)
         exact |= {key: text for key, text in {**of_site_exact, **of_rig_exact}.items() if key not in exact}
         weight = fit.covariance @ _inverse(own.covariance[np.ix_(fit.common, fit.common)], 1.0 / fit.prior)
         back = np.linalg.inv(product_slope(own.coefficients))
@@ -305,7 +307,7 @@ def _besides(
             shift = slope @ weight @ (back @ each.sensitivity)[fit.common]
             before = whole[name][1] if name in whole else np.zeros(len(u))
             whole[name] = each, before + shift
-        if (found := evidence(part.recording, part.settings, own)) is not None:
+        if (found := evidence(passed, part.settings)) is not None:
             left.append(found._replace(shift=weight @ found.shift[fit.common]))
     named = [replace(each, source=name, sensitivity=shift) for name, (each, shift) in whole.items()]
     return named, exact, left

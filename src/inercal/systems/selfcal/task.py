@@ -17,8 +17,9 @@ from inercal.foundation.results.shown import Table, rounded
 from inercal.systems.selfcal.before import considered
 from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.diagnosis.examination import diagnose
+from inercal.systems.selfcal.diagnosis.passed import pass_of
 from inercal.systems.selfcal.estimators import KINDS, FilterKind
-from inercal.systems.selfcal.filters import averaged
+from inercal.systems.selfcal.filters import averaged, whitened
 from inercal.systems.selfcal.filters import run as filtering
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.gaps import taken_anew
@@ -27,7 +28,7 @@ from inercal.systems.selfcal.find_base import heading, is_rough, relative, with_
 from inercal.systems.selfcal.platform.coefficients import BETA
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.reading import as_recorded, recording_of
-from inercal.systems.selfcal.result.budget import stated_errors
+from inercal.systems.selfcal.result.budget import bounds_of, stated_errors
 from inercal.systems.selfcal.result.comparison import beside, differing, of_attitude, stated_variance
 from inercal.systems.selfcal.result.outcome import assemble, verdict
 from inercal.systems.selfcal.result.tables import of_attitudes, side_by_side
@@ -63,6 +64,7 @@ def load_kernels(settings: SelfcalSettings, compare: bool = False) -> None:
     none = np.empty((0, 3))
     empty = Recording(np.empty(0), none, none, none)
     recorded_bounds(empty, of, np.empty((0, 4)), np.zeros(len(of.prior)), contributions=True)
+    whitened.load_kernels(of)
     averaged.load_kernels(of)
     considered.load_kernels(of)
 
@@ -89,13 +91,14 @@ def calibrate(
     settings, left_out = told_apart(settings, still_joints(settings, recording.th), recording.th[0])
     of = problem(settings)
     progress(f"filtering ({of.filter.kind})")
-    filtered = filtering.estimate(recording, of, courses=courses)
-    assert filtered.history is not None
-    along = filtered.history.attitude, filtered.coefficients
-    bounds = recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
+    row_by_row = filtered = filtering.estimate(recording, of, courses=courses)
     progress("looking for faults")
+    passed = pass_of(recording, of, filtered)
+    if passed is not None and filtered.kind == "error-state":
+        filtered = passed.final  # judged at its values
+    bounds = _lost_bounds(recording, of, filtered) if passed is None else bounds_of(passed)
     faults = [
-        *diagnose(recording, of, filtered, stated_errors(settings)),
+        *diagnose(recording, of, filtered, stated_errors(settings), passed),
         *taken_anew(recording, filtered),
         *left_out,
     ]
@@ -106,14 +109,14 @@ def calibrate(
             compared[kind] = filtering.estimate(recording, of.for_kind(kind), kind)
     faults += differing(filtered, compared)
     progress("assembling")
-    estimate = assemble(recording, settings, filtered, bounds, faults)
+    estimate = assemble(recording, settings, filtered, bounds, faults, passed)
     result, message = dict(estimate.result), estimate.message
     if rough and estimate.names:
         base, words = _base(settings, estimate)
         result, message = result | base, message + words
     stated = stated_variance(filtered, estimate.u) if estimate.names else np.zeros(len(of.prior))
     for name, other in compared.items():
-        own = verdict(other, recording, settings, faults)[0]
+        own = verdict(other, recording, settings, faults, passed)[0]
         result["compare"] |= {name: beside(other, own, stated, recording.reference)}
     result |= of_attitude(filtered, recording.reference)
     steps = {"step": filtered, **{f"step {name}": other for name, other in compared.items()}}
@@ -125,7 +128,14 @@ def calibrate(
     truth = None if settings.true_values is None else settings.true_values[of.states.index]
     if truth is not None and rough:
         truth[BETA] = relative(truth[BETA], stated_base, settings.base)
-    return Calibration(timed, of, recording, filtered, bounds, settings, compared, stated, truth)
+    return Calibration(timed, of, recording, row_by_row, bounds, settings, compared, stated, truth)
+
+
+def _lost_bounds(recording: Recording, of: FilterProblem, filtered: FilterResult) -> PathBounds:
+    """Bounds where the values of a filter are lost: along its attitudes."""
+    assert filtered.history is not None
+    along = filtered.history.attitude, filtered.coefficients
+    return recorded_bounds(recording, of, *along, contributions=True, restarts=filtered.restarts)
 
 
 def based(

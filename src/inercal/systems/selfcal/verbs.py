@@ -91,8 +91,8 @@ def _together(records: Sequence[Record], study: Study, progress: Progress) -> Re
 
 def simulate(study: Study, rng: np.random.Generator) -> Record:
     """A simulated record of a platform that turns through the plan of the study."""
-    from inercal.systems.selfcal.before.simulate import experiment, to_record
-    from inercal.systems.selfcal.before.simulate import simulate as simulate_run
+    from inercal.systems.selfcal.simulate import experiment, to_record
+    from inercal.systems.selfcal.simulate import simulate as simulate_run
 
     with study.at_fault():
         made = simulate_run(experiment(study.settings), rng)

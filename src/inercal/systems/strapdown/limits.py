@@ -54,7 +54,7 @@ class Limits:
     """Standard deviation [rad] of the first attitude about level axes, without what biases do to it."""
 
     start_heading: float = math.radians(5.0)
-    """The same about the vertical where it was found from earth rate."""
+    """The same about the vertical where it was found from earth rate, without what biases do to it."""
 
     over_earth_rate: float = 10.0
     """Mean rate at rest, over earth rate, from which on it is the bias that the fit begins with."""
@@ -135,6 +135,9 @@ class Limits:
 
     path_starts: int = 5
     """Random paths that the search for a path begins with."""
+
+    level_axis: float = 20.0
+    """Angle [deg] from level, or from vertical, up to which the axis of a turn is called so."""
 
     told: float = 1.1
     """Factor by which a turn lowers the u of a coefficient that it is said to tell."""

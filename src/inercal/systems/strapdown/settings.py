@@ -13,6 +13,7 @@ from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
 from inercal.foundation.keys import (
+    AS_TYPED,
     DEVIATION,
     FREQUENCY,
     RELATIVE_U,
@@ -327,7 +328,10 @@ class StrapdownSettings:
         "the search for a path; without this table the plan is judged alone", None
     )
     motion: Motion = table("motion in a simulated recording", Motion())
-    truth: Mapping[str, float] = field(default_factory=dict)
+    truth: Mapping[str, float] = table(
+        "true coefficients of a simulated recording by symbol, outputs in m/s^2 and rad/s; those of a perfect unit if "
+        "absent", {}, example={"D_F_x": "0.1 deg/h", "r_xx": "1 cm"}, reads=AS_TYPED,
+    )  # fmt: skip
     traceability: Mapping[str, str] = field(default_factory=dict)
     temperature: Quantity | None = None
     given: Mapping[str, Any] = field(default_factory=dict)

@@ -14,10 +14,10 @@ from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import Estimate, timed
 from inercal.systems.strapdown.fit.batch import Fit, fit
 from inercal.systems.strapdown.fit.error_state import filtered
+from inercal.systems.strapdown.fit.restricted import with_noise_shown
 from inercal.systems.strapdown.fit.rests import found_rests, mean_force, nodes_of
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.restricted import with_noise_shown
 from inercal.systems.strapdown.reading import evened, samples_of
 from inercal.systems.strapdown.result.outcome import assemble, failed, too_few, useless
 from inercal.systems.strapdown.settings import StrapdownSettings

@@ -20,6 +20,13 @@ class Limits:
     most_samples: int = 10_000_000
     """Samples of a simulation that fit into memory with all errors of the table."""
 
+    runaway: float = 1e3
+    """Growth of u in the last round of weights that says that they do not settle: with the terms the weights of all
+    readings sink."""
+
+    foreseen_positions: int = 200
+    """Positions of a plan at most of which u is foreseen with better or worse errors of the table."""
+
     condition: float = 100.0
     """Condition number of the unit-length columns beyond which a combination of terms counts as weakly known."""
 
@@ -117,16 +124,6 @@ class Limits:
 
     least_seen: float = 0.01
     """Part of a fault's effect outside the terms below which it does not show."""
-
-    scale_off: float = 0.1
-    """Part by which a scale factor whose two sides have one unit may differ from 1, and by u of its uncertainty from
-    what it can be."""
-
-    angle_off: float = 0.1
-    """Misalignment [rad] beyond which axes are exchanged, or the mounting is another one."""
-
-    range_off: float = 0.05
-    """Part by which a scale factor may differ from a power of two to be that of another range."""
 
     outside_zone: int = 2
     """Distinct inputs that are to lie beyond a dead zone on either side."""

@@ -11,8 +11,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.designs.criteria import basis
 from inercal.foundation.errors import StudyError
 from inercal.foundation.geometry.earth import EARTH_RATE
-from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, channel_model
-from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.instruments.by_angle import CHANNELS, EXTRA, ChannelModel, channel_model
 from inercal.foundation.rigs.chain import Chain
 from inercal.foundation.rigs.outputs import gravity_reference, rate_reference
 from inercal.systems.turntable.settings import TurntableSettings

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.inference.identifiability import Identifiability, few_terms, identify, in_words
-from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.instruments.by_angle import ChannelModel
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel
 from inercal.systems.turntable.second_order import SecondOrder, second_order
@@ -40,9 +40,6 @@ from inercal.systems.turntable.weights import (
 
 _ROUNDS = 6
 """Fits that are made at most; the derivatives hardly change after the first."""
-
-_RUNAWAY = 1e3
-"""Growth of u in the last of these that says that they do not end: with the terms the weights of all readings sink."""
 
 FLOOR = 1e-12
 """Least standard deviation of a reading, over the rms of the readings: that of a simulation without noise."""
@@ -305,7 +302,7 @@ def fit_to_order(
         if np.all(change <= 1e-3 * u):
             break
     else:
-        settled = bool((u <= _RUNAWAY * before).all())
+        settled = bool((u <= LIMITS.runaway * before).all())
     if not (
         settled and np.isfinite(c).all() and np.isfinite(solution.joint).all() and (noise_fit.dof > 0.0).all()
     ):

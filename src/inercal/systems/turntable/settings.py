@@ -11,7 +11,10 @@ from inercal.foundation.arrays import short_repr
 from inercal.foundation.designs.tolerances import Price
 from inercal.foundation.errors import InputError
 from inercal.foundation.geometry.earth import Site
+from inercal.foundation.instruments.by_angle import CHANNELS, channel_model
+from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.keys import (
+    AS_TYPED,
     FREQUENCY,
     OUTPUT,
     RATE,
@@ -19,6 +22,7 @@ from inercal.foundation.keys import (
     REQUIRED,
     TIME,
     above_zero,
+    keyed,
     option,
     quantities,
     quantity,
@@ -26,7 +30,7 @@ from inercal.foundation.keys import (
     within,
 )
 from inercal.foundation.rigs.chain import Chain
-from inercal.foundation.rigs.plans import Plan
+from inercal.foundation.rigs.plans import PLAN_NAME, Plan
 from inercal.foundation.units import Quantity, Unit
 
 JointName = Literal["phi1", "phi2", "phi3"]
@@ -83,11 +87,21 @@ class Instrument:
     kind: Literal["gyrowheel", "gyro", "accelerometer"] = option(
         "gyrowheel (two drift outputs), gyro or accelerometer (one to three)", "gyrowheel"
     )
-    unit: Unit = field(default_factory=lambda: Unit("rad/s", "rate", 1.0))
-    terms: tuple[str, ...] | None = None
-    coefficients: Mapping[str, float] = field(default_factory=dict)
+    unit: Unit = quantity(
+        "of its outputs where no record says it; that of the noise, rad/s or m/s^2 if absent", OUTPUT,
+        Unit("rad/s", "rate", 1.0), example="deg/h",
+    )  # fmt: skip
+    terms: tuple[str, ...] | None = option(
+        "terms to estimate; those usual for the kind if absent", None, least=1
+    )
+    coefficients: Mapping[str, float] = option(
+        "values of terms by symbol: true ones to simulate, stated ones where a term is not fitted", {}, reads=AS_TYPED
+    )  # fmt: skip
     coefficients_u: Mapping[str, float] = field(default_factory=dict)
-    noise: float | None = None
+    noise: float | None = quantity(
+        "standard deviation of a reading, or random walk; from the scatter if absent", OUTPUT,
+        example="0.01 deg/h",
+    )  # fmt: skip
     dwell: float = quantity("time in each position", "time", "60 s", bounds=TIME)
     sample_rate: float | None = quantity(
         "samples per second of a simulation; one row a position if absent", "frequency", example="10 Hz",
@@ -132,12 +146,48 @@ class PositionDesign:
         "D: volume, A: mean variance of the coefficients; I: variance of prediction", "D"
     )
     table_errors: bool = option("judge with the errors of the table, or by the noise alone", True)
-    compare: tuple[str, ...] = ()
+    compare: tuple[str, ...] = option(
+        "named plans to set beside; all the table can take if absent", (), reads=PLAN_NAME
+    )
     constraint: Constraint | None = table(
         "only positions of low sensitivity; all if absent", None,
         example={"factors": ["dtheta_x"], "outputs": ["ax"], "below": 0.3}, name="sensitivity",
     )  # fmt: skip
     seed: int = option("of the random starts", 1, least=0)
+
+
+DRIFT = "drift"
+"""The goal that is no coefficient."""
+
+SYMBOLS = {
+    kind: tuple(symbol for channel in channels for symbol in channel_model(kind, channel).symbols)
+    for kind, channels in CHANNELS.items()
+}
+"""Coefficients by kind of instrument."""
+
+_GOALS = {
+    symbol: (
+        Any,
+        option(f"wanted u of {symbol}: {TERMS[symbol].name}", None, example="0.01 deg/h", reads=AS_TYPED),
+    )
+    for symbols in SYMBOLS.values()
+    for symbol in symbols
+}
+
+
+@dataclass(frozen=True)
+class WantedOfTable(keyed("WantedByName", _GOALS)):  # type: ignore[misc]
+    """Wanted uncertainties, for design tolerances: of coefficients, and of the drift after compensation."""
+
+    drift: Any = option(
+        "wanted u of the output that the coefficients predict, rms over all directions of gravity", None,
+        example="0.02 deg/h", reads=AS_TYPED,
+    )  # fmt: skip
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """Those stated, as typed, by symbol or `DRIFT`."""
+        return {name: text for name, text in vars(self).items() if text is not None}
 
 
 @dataclass(frozen=True)

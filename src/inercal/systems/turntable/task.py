@@ -11,12 +11,10 @@ import numpy as np
 from inercal.foundation.records.record import Record
 from inercal.foundation.results.result import timed
 from inercal.systems.turntable.positions.calibration import PositionCalibration, calibrate_positions
-from inercal.systems.turntable.positions.simulate import simulate as simulate_positions
 from inercal.systems.turntable.rate.calibration import RateCalibration, calibrate_rates
-from inercal.systems.turntable.rate.simulate import simulate_rate_test
 from inercal.systems.turntable.settings import TurntableSettings
-from inercal.systems.turntable.steps.calibration import StepCalibration, calibrate_steps
-from inercal.systems.turntable.steps.simulate import simulate_step_test
+from inercal.systems.turntable.simulate import simulate_positions, simulate_rate_test, simulate_step_test
+from inercal.systems.turntable.step_test import StepCalibration, calibrate_steps
 
 
 def calibrate(

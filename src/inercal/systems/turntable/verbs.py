@@ -137,12 +137,12 @@ def sensitivity(
     executor: Executor | None = None,
 ) -> Result:
     """Influence of each error of the table; ``evidence`` is the
-    `inercal.systems.turntable.sensitivity.analysis.Analysed`.
+    `inercal.systems.turntable.sensitivity.Analysed`.
 
     Without ``maps`` indices of each position may be left out; ``say`` takes messages about long steps.
     """
     from inercal.foundation.records.read import source_of
-    from inercal.systems.turntable.sensitivity.analysis import analyse, result, table
+    from inercal.systems.turntable.sensitivity import analyse, result, table
 
     with study.at_fault():
         analysed = analyse(study.settings, maps, say, progress, executor)

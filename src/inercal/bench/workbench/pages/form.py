@@ -133,7 +133,10 @@ def _key(
     elif one.get("type") == "string":
         widget = "text"
     elif any(each.get("type") == "string" for each in options):
-        widget = "text" if isinstance(table.get(name, ""), str) else "value"
+        worded = isinstance(table.get(name, ""), str) and not any(
+            each.get("type") == "boolean" for each in options
+        )
+        widget = "text" if worded else "value"  # true is no text
     value = table.get(name)
     shown = "" if value is None else value if widget in ("text", "choice") else toml(value)
     examples = key.get("examples") or [""]

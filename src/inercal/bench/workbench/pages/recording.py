@@ -36,13 +36,13 @@ from inercal.bench.workbench.sessions import MAP, STUDY, Session, put
 from inercal.faces.studies.text import changed, toml, with_keys
 from inercal.foundation._files import read_bytes
 from inercal.foundation.errors import InercalError
-from inercal.foundation.records.channels import is_channel, nearest
-from inercal.foundation.records.guess import columns_of
+from inercal.foundation.records.channels import is_channel, nearest, sensor_and_axis
 from inercal.foundation.records.places import counted
+from inercal.foundation.records.recognise.map_text import columns_of
+from inercal.foundation.records.recognise.units import choices
 from inercal.systems.listed import SYSTEMS
 
-_NONE = ""
-"""Choice of a column for a channel that is not in the file."""
+_NONE = ""  # the choice of a column for a channel that is not in the file
 
 
 @dataclass(frozen=True)
@@ -74,13 +74,8 @@ def columns_there(session: Session) -> dict[Path, tuple[str, ...]]:
     found = {}
     for path in session.recordings:
         with suppress(InercalError):
-            found[path] = tuple(dict.fromkeys(_written(each) for each in columns_of(path)))
+            found[path] = tuple(dict.fromkeys(toml(each) for each in columns_of(path)))
     return found
-
-
-def _written(origin: Any) -> str:
-    """The place of a channel in its file, as the map writes it."""
-    return toml(origin)
 
 
 class Columns:
@@ -93,7 +88,7 @@ class Columns:
         heading("Columns to channels")
         self.place = ui.element("div").classes("w-full flex flex-col gap-2")
         self.fill()
-        ui.label("What else a map can say is changed in its text:").classes("quiet")
+        ui.label("The rest of a map is changed in its text:").classes("quiet")
         with ui.element("div").classes("w-full copies"):
             self.text = ui.textarea(value=self.written).classes("w-full command")
             self.text.props(f'outlined autogrow aria-label="text of {MAP}"')
@@ -124,20 +119,40 @@ class Columns:
                 ]
                 if part.table != "columns":
                     ui.label(part.path.name)
-                table(["Channel", "From", "Unit", "Sign", "Kind"], rows)
+                table(["Channel", "From", "Unit", "Sign", "Kind", "Recognised"], rows)
+                self.questions(part)
                 self.more(part)
+
+    def questions(self, part: FileColumns) -> None:
+        """Questions about sensors whose unit is a guess, with the units to choose from."""
+        asked: dict[str, list[str]] = {}
+        for name, entry in part.columns.items():
+            if isinstance(entry, dict) and entry.get("grade") == "guess":
+                asked.setdefault(sensor_and_axis(name)[0], []).append(name)
+        for names in asked.values():
+            entry, paths = part.columns[names[0]], [f"{part.table}.{name}" for name in names]
+            with ui.row().classes("items-center").props('data-question="1"'):
+                ui.label(str(entry.get("question", names[0])))
+                for unit in choices(str(entry.get("unit", ""))):
+                    button(unit, partial(self.answer, paths, unit))
+
+    async def answer(self, paths: Sequence[str], unit: str, grade: str = "guess") -> None:
+        """Channels have the unit that was chosen, certain with a ``grade``; drawn anew for a guess, lest one types."""
+        known = {"grade": '"certain"', "because": '"as answered"', "question": ""} if grade else {}
+        said = known | {"unit": toml(unit)}
+        await self.write({f"{path}.{key}": said[key] for path in paths for key in said})
+        if grade == "guess":
+            self.fill()
 
     def row(self, part: FileColumns, name: str, entry: Mapping[str, Any]) -> list[Any]:
         """A channel of the map."""
         path = f"{part.table}.{name}"
-        taken = _written(entry.get("from"))
+        taken = toml(entry.get("from"))
 
         async def column(chosen: str) -> None:
-            if chosen == _NONE:
-                await self.write({path: ""})
-                self.fill()
-            else:
-                await self.change(f"{path}.from", chosen, "value")
+            kept = chosen != _NONE
+            await (self.change(f"{path}.from", chosen, "value") if kept else self.write({path: ""}))
+            self.fill()
 
         def origin() -> None:
             columns = [_NONE, *dict.fromkeys([taken, *part.there])]
@@ -147,9 +162,9 @@ class Columns:
             ).classes("w-40")
 
         def unit() -> None:
-            field = ui.input(value=str(entry.get("unit", ""))).props(f'dense aria-label="unit of {name}"')
-            field.classes("w-28")
-            field.on("change", lambda: self.change(f"{path}.unit", field.value, "text"))
+            grade, aria = entry.get("grade", ""), f'dense aria-label="unit of {name}"'
+            field = ui.input(value=entry.get("unit", "")).props(aria).classes("w-28")
+            field.on("change", lambda: self.answer([path], field.value, grade))
 
         def sign() -> None:
             ui.select(
@@ -163,11 +178,14 @@ class Columns:
                 on_change=lambda event: self.change(f"{path}.kind", event.value, "text"),
             ).props(f'dense aria-label="kind of {name}"')  # fmt: skip
 
-        return [name, origin, unit, sign, kind]
+        def recognised() -> None:
+            ui.label(str(entry.get("grade", ""))).tooltip(str(entry.get("because", "")))
+
+        return [name, origin, unit, sign, kind, recognised]
 
     def more(self, part: FileColumns) -> None:
         """One more channel, by its name, from a column that is not in use."""
-        used = {_written(each.get("from")) for each in part.columns.values() if isinstance(each, dict)}
+        used = {toml(each.get("from")) for each in part.columns.values() if isinstance(each, dict)}
         left = [each for each in part.there if each not in used]
         if not left:
             return

@@ -17,6 +17,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import may_be_empty, of_a_table
 from inercal.foundation.records.checks.angles import angle_findings
+from inercal.foundation.records.checks.stretches import of_stretches
 from inercal.foundation.records.checks.values import (
     accelerometer_unit,
     dead_channel,
@@ -55,6 +56,11 @@ def check(columns: Mapping[str, Column]) -> tuple[Finding, ...]:
                 findings += dead_channel(column.values, column.name)
             if column.name == "temperature":
                 findings += temperature_unit(column)
+        for clock in clocks.values():
+            of_clock = [c for c in columns.values() if c.t is clock.t and _SENSOR.fullmatch(c.name)]
+            if sampled and of_clock:
+                values = np.stack([c.values for c in of_clock], axis=1)
+                findings += of_stretches(values, [c.name for c in of_clock])
         findings += accelerometer_unit(columns)
         findings += gyro_unit(columns)
         findings += angle_findings(columns)

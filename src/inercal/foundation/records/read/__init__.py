@@ -168,7 +168,7 @@ def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: 
     columns, of_time = with_sound_stamps(joined(tables, record_map, counted))
     sources = [
         *(file.source for file in tables),
-        *([] if record_map is None else [source_of(record_map.path)]),
+        *([] if record_map is None or not record_map.written else [source_of(record_map.path)]),
     ]
     if not columns:
         raise RecordError(tables[0].path, "found a time column alone, expected a channel")
@@ -185,6 +185,7 @@ def _record(tables: Sequence[FileTable], record_map: RecordMap | None, counted: 
         tuple(dict.fromkeys(sources)),
         next((file.table.labels for file in tables if file.table.labels), ()),
         rate_u=None if record_map is None or record_map.rate is None or stamped else record_map.rate_u,
+        taken={} if record_map is None else record_map.taken,
     )
 
 

@@ -130,7 +130,9 @@ def row_rate(channels: Sequence[Channel], rate: float | None, path: Path) -> flo
     if of_a_table(channel.name for channel in channels) and not any(each.increment for each in channels):
         return 1.0
     raise RecordError(
-        path, 'found no time column t, expected one, or [time] rate = "100 Hz" (say) in a column map'
+        path,
+        'found no time column t, expected one, or the sample rate: [time] rate = "100 Hz" (say) in a '
+        'column map, or --answer "rate=100 Hz"',
     )
 
 
@@ -140,8 +142,18 @@ def _seconds(file: FileTable) -> Array:
     t = file.table.values["t"]
     if np.isnan(t).all():
         raise RecordError(file.path, f"found no number in the time column of {t.size} rows, expected seconds")
+    if channel.stamps is not None and channel.stamps.wrap:
+        t = unwrapped(t, channel.stamps.wrap)
     (factor,), _ = conversion(channel)
     return t if factor == 1.0 else t * factor
+
+
+def unwrapped(t: Array, wrap: float) -> Array:
+    """A counter (n,) that falls to zero at ``wrap``, going on instead."""
+    known = np.flatnonzero(np.isfinite(t))
+    whole = t.copy()
+    whole[known] += wrap * np.cumsum(np.diff(t[known], prepend=t[known[:1]]) < -0.5 * wrap)
+    return whole
 
 
 def conversion(channel: Channel, interval: float = 0.0) -> tuple[tuple[float, ...], Unit]:

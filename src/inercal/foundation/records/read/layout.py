@@ -21,6 +21,9 @@ from inercal.foundation.errors import RecordError
 from inercal.foundation.records.read.limits import HEADER, LINE, check_unpacked, unpacked
 from inercal.foundation.records.read.table import LARGEST, FileOptions
 
+UNENDED = "no line end follows: the last number"
+"""Beginning of the finding on a last line that may have had more digits."""
+
 _BLOCK = LINE
 _GZIP = b"\x1f\x8b"
 _BOM = b"\xef\xbb\xbf"

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from inercal.foundation.errors import MissingExtraError, QuantityError
+from inercal.foundation.errors import MissingExtraError
 from inercal.foundation.records.read.arrays import ArrayFormat, Contents, NamedArray, held
 from inercal.foundation.records.read.limits import FIELDS
-from inercal.foundation.units import parse_unit
+from inercal.foundation.records.recognise.lines import row_of_units
 
 Cell = Any
 """A cell of python-calamine: float, int, str, bool, a date or time, a duration; "" where a cell is empty."""
@@ -86,26 +86,12 @@ def _titles(
         said = [words[index] for index in filled if words[index]]
         if 2 * len(said) < len(filled):
             continue
-        if not any(units) and 3 * sum(map(_is_unit, said)) >= 2 * len(said):
-            units = [_bare(word) or None for word in words]
+        if not any(units) and (found := row_of_units(words)) is not None:
+            units = list(found)
             continue
         names = [words[index] or names[index] for index in range(width)]
         break
     return names, units
-
-
-def _bare(word: str) -> str:
-    """A unit without the brackets about it."""
-    return word.strip("[]() ")
-
-
-def _is_unit(word: str) -> bool:
-    """True for a unit, in brackets or not; a single letter such as x is none."""
-    try:
-        parse_unit(_bare(word))
-    except QuantityError:
-        return False
-    return True
 
 
 def _is_number(cell: Cell) -> bool:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -24,7 +26,9 @@ class FileOptions:
     ``delimiter`` " " is any run of blanks; ``comment`` begins lines to pass over (``#`` and ``%`` if None);
     ``skip`` counts lines before the header, or bytes of a binary file; ``variable`` is the array of a file that holds
     several. ``transpose``: rows are channels. A raw ``binary`` file has a type of NumPy for each of its ``fields``, and
-    where its rows are frames, with sync bytes and check, a ``frame``.
+    where its rows are frames, with sync bytes and check, a ``frame``. Lines that are no rows of cells: ``json``
+    objects or ``documents``, those that begin with the word of a ``message``, or a ``pattern`` of words, {} for each
+    number.
     """
 
     delimiter: str | None = None
@@ -36,6 +40,9 @@ class FileOptions:
     binary: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()
     frame: Frame | None = None
+    lines: str = ""
+    message: str = ""
+    pattern: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,7 +84,7 @@ class FirstLook:
 
     ``values`` (n, k) are its columns (text is NaN), ``names`` (k,) its header and ``units`` (k,) those stated
     beside the names, if any; ``leading`` holds the lines passed over by ``options.skip``. Columns ``numbered`` are
-    found by their number alone: their names stand in those lines.
+    found by their number alone: their names stand in those lines. ``texts`` are columns, by index, of words.
     """
 
     values: Array
@@ -87,6 +94,12 @@ class FirstLook:
     leading: tuple[str, ...] = ()
     units: tuple[str | None, ...] = ()
     numbered: bool = False
+    texts: Mapping[int, tuple[str, ...]] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def times_named(self) -> Counter[str]:
+        """Counts of the names in the header; empty where none is a name."""
+        return Counter(self.names) if any(self.names) else Counter()
 
 
 class Reader(Protocol):

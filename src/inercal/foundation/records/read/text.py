@@ -23,20 +23,21 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.records.channels import Channel, may_be_empty
 from inercal.foundation.records.checks import too_long
 from inercal.foundation.records.places import counted, counted_names, places, shortened
-from inercal.foundation.records.read.layout import Block, TextLayout, blocks, find_layout, is_rounded
+from inercal.foundation.records.read.layout import UNENDED, Block, TextLayout, blocks, find_layout, is_rounded
+from inercal.foundation.records.read.lying import on_its_side
+from inercal.foundation.records.read.rewriting import is_rewritten, with_layout
 from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
+from inercal.foundation.records.read.time_stamps import seconds_of
 from inercal.foundation.records.recognise.lines import heading
+from inercal.foundation.records.recognise.shapes import lines_found
 from inercal.foundation.records.titles import EXAMPLE, bare, canonical
 from inercal.foundation.units import shown
-
-UNENDED = "no line end follows: the last number"
-"""Beginning of the finding on a last line that may have had more digits."""
 
 _FEW = 4  # blocks that take NumPy, where nothing is missing, no longer than loading what is compiled
 _MOST_ODD = 4096
 _NO_LINES = np.empty(0, np.int64)
-_HEADER_LINES = 50
-_LAYOUT_LINES = 400
+_HEADER_LINES, _LAYOUT_LINES = 50, 400
+_TEXTS = 20  # columns of words
 
 
 @dataclass(frozen=True)
@@ -55,19 +56,30 @@ def read(
 ) -> list[RawTable]:
     """Read a text file as one table; without ``channels`` its header must be canonical (``t [s],acc_x [m/s^2]``)."""
     if options.transpose:
-        return _on_its_side(path, options, channels, progress)
+        return on_its_side(path, options, channels, progress)
     with path.open("rb") as file:
         stream = blocks(file, path)
-        head = next(stream)
-        layout = find_layout(head.lines, options, path)
+        if is_rewritten(options):
+            head, stream, layout = with_layout(stream, options, _names_wanted(options, channels))
+        else:
+            head = next(stream)
+            layout = find_layout(head.lines, options, path)
         located = locate(channels, layout, head.lines, path)
-        numbers = {channel.name: index for channel, index in located.items() if channel.name != "label"}
+        t = next((channel for channel in located if channel.name == "t" and channel.stamps), None)
+        numbers = {
+            channel.name: index for channel, index in located.items()
+            if channel.name != "label" and (channel is not t or not _in_words(t))
+        }  # fmt: skip
+        beside = None if t is None else _beside(t, layout, path)
+        if beside is not None and t is not None and not _in_words(t):
+            numbers[_REST] = beside
         label = next((index for channel, index in located.items() if channel.name == "label"), None)
-        if not numbers:
+        if not located:
             return [RawTable((), {}, contents(layout), 0)]
 
         pieces: list[list[Array]] = [[] for _ in numbers]
         labels: list[str] = []
+        clocks: tuple[list[str], list[str]] = ([], [])
         flaws: list[_Flaws] = []
         rounded: dict[str, list[int]] = {name: [] for name in numbers}
         block = head
@@ -84,8 +96,17 @@ def read(
                     rounded[name] += _rounded(block, layout, numbers[name], piece)
             if label is not None:
                 labels += _labels(block, layout, label)
+            if t is not None and _in_words(t):
+                for texts, index in zip(clocks, (located[t], beside), strict=True):
+                    texts += [] if index is None else _labels(block, layout, index)
             progress(file.tell())
     values = {name: np.concatenate(pieces.pop(0)) for name in numbers}
+    if t is not None and t.stamps is not None:
+        rest = values.pop(_REST, None)
+        if _in_words(t):
+            values["t"] = seconds_of(clocks[0], t.stamps.order, clocks[1] or None) / t.unit.factor
+        elif rest is not None:
+            values["t"] = values["t"] + rest * (t.stamps.rest / t.unit.factor)
     if all(np.isnan(column).all() for column in values.values()):
         line = head.lines[layout.first]
         raise RecordError(
@@ -95,6 +116,33 @@ def read(
     findings = _findings(flaws, tuple(numbers), block, layout, set(numbers.values()))
     findings += tuple(too_long(name, "line", lines) for name, lines in rounded.items() if lines)
     return [RawTable(tuple(located), values, contents(layout), count, tuple(labels), findings)]
+
+
+_REST = "rest of t"
+
+
+def _in_words(t: Channel) -> bool:
+    """True for times that are dates and times of day in words."""
+    return bool(t.stamps and t.stamps.order)
+
+
+def _beside(t: Channel, layout: TextLayout, path: Path) -> int | None:
+    """Number of the column with the rest of the time, None where there is none."""
+    if t.stamps is None or t.stamps.beside is None:
+        return None
+    found = _index(replace(t, origin=t.stamps.beside), layout, path)
+    if found is None:
+        raise RecordError(path, f"time.beside: found no {shown(t.stamps.beside)} in {contents(layout)}")
+    return found
+
+
+def _names_wanted(options: FileOptions, channels: tuple[Channel, ...] | None) -> tuple[str, ...]:
+    """The names of numbers in objects or documents that channels are found by."""
+    origins = [channel.origin for channel in channels or ()]
+    origins += [
+        each.stamps.beside for each in channels or () if each.stamps and each.stamps.beside is not None
+    ]
+    return tuple(dict.fromkeys(str(each) for each in origins)) if options.lines else ()
 
 
 def header(path: Path) -> tuple[Channel, ...]:
@@ -108,6 +156,10 @@ def peek(path: Path) -> list[FirstLook]:
     """Look at the first 2 MB of a text file; lines before the header are found out."""
     with path.open("rb") as file:
         head = next(blocks(file, path))
+    if (found := lines_found(head.lines)) is not None:
+        block, _, layout = with_layout(iter([head]), found.options, found.named)
+        first = _first_look(block, layout, found.options)
+        return [replace(first, names=found.names, units=found.units, numbered=not found.named)]
     above = heading(head.lines)
     try:
         look = _look(head, _leading(head.lines, path), path)
@@ -129,9 +181,17 @@ def _look(head: Block, skip: int, path: Path) -> FirstLook:
     """The rows behind so many lines, with the names in the header, if any."""
     layout = find_layout(head.lines, FileOptions(skip=skip), path)
     layout = layout.settled(head.lines[layout.first :])
-    rows, _ = _line_by_line(head.after(layout.first), layout, tuple(range(layout.width)))
+    look = _first_look(head.after(layout.first), layout, FileOptions(skip=skip))
     names = (*layout.header, *repeat("", layout.width))[: layout.width] if layout.header else ()
-    return FirstLook(rows, names, FileOptions(skip=skip), leading=tuple(head.lines[:skip]))
+    return replace(look, names=names, leading=tuple(head.lines[:skip]))
+
+
+def _first_look(block: Block, layout: TextLayout, options: FileOptions) -> FirstLook:
+    """The rows of a block, and the texts of columns that hold no numbers."""
+    rows, _ = _line_by_line(block, layout, tuple(range(layout.width)))
+    worded = np.flatnonzero(np.isnan(rows).mean(axis=0) > 0.5) if len(rows) else ()
+    texts = {int(index): tuple(_labels(block, layout, int(index))) for index in worded[:_TEXTS]}
+    return FirstLook(rows, (), options, texts=texts)
 
 
 def _has_odd_row(look: FirstLook) -> bool:
@@ -337,42 +397,3 @@ def _findings(
                 Finding("nan", f"{name}: {counted(lines.size, 'missing value')}", places("line", lines))
             )
     return tuple(findings)
-
-
-def _on_its_side(
-    path: Path,
-    options: FileOptions,
-    channels: tuple[Channel, ...] | None,
-    progress: Callable[[int], None],
-) -> list[RawTable]:
-    """Read a file with a line for each channel; a line may begin with a name, by which the map then finds it.
-
-    Raises `RecordError` where the lines have no numbers, or not equally many.
-    """
-    from inercal.foundation.records.read.arrays import Contents, held, tables
-
-    lines: list[str] = []
-    with path.open("rb") as file:
-        for block in blocks(file, path):
-            lines += block.lines
-    layout = find_layout(lines, options, path).settled(lines)
-    rows = [layout.fields(line) for line in lines[options.skip :] if layout.is_row(line)]
-    if any(row is None for row in rows):
-        raise RecordError(
-            path, "found lines of different lengths, expected equally many numbers for each channel"
-        )
-    texts = [row for row in rows if row]
-    named = all(layout.number(row[0]) is None for row in texts)
-    names = [row[0].strip() if named else f"line {k}" for k, row in enumerate(texts, 1)]
-    numbers = [[layout.number(text) for text in row[named:]] for row in texts]
-    if any(value is None for row in numbers for value in row):
-        raise RecordError(path, "found words among the numbers, expected a line of numbers for each channel")
-    values = np.array(numbers, dtype=float)
-    last = texts[-1]
-    cut = block.cut and not layout.is_whole(last[-1], last[named:-1])
-    findings = (
-        (Finding("truncated", f"{UNENDED}, {last[-1]}, may be cut", f"line {block.last}"),) if cut else ()
-    )
-    progress(path.stat().st_size)
-    columns = {name: held(row) for name, row in zip(names, values, strict=True)}
-    return tables(Contents(columns, findings, tabular=True), options, channels or (), path, mapped=True)

@@ -7,7 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from inercal.foundation.errors import QuantityError
 from inercal.foundation.records.recognise.words import unit_of
+from inercal.foundation.units import parse_unit
 
 _SAMPLE = 100
 _LOOKED_AT = 400
@@ -109,9 +111,28 @@ def _names(line: str, mark: str | None, width: int) -> tuple[str, ...] | None:
 
 
 def _units(line: str, mark: str | None, width: int) -> tuple[str | None, ...] | None:
-    """The units in a line, if two thirds of its cells but the first are such."""
-    cells = [cell.strip("[]() ") for cell in _cells(re.sub(r"^\s*(?:#+|%+|//)\s*", "", line), mark)]
-    known = [bool(unit_of(cell)) for cell in cells]
-    if len(cells) != width or width < 2 or 3 * sum(known[1:]) < 2 * (width - 1):
+    """The units in a line of as many cells, if it is a row of units."""
+    cells = _cells(re.sub(r"^\s*(?:#+|%+|//)\s*", "", line), mark)
+    return row_of_units(cells) if len(cells) == width else None
+
+
+def row_of_units(cells: Sequence[str]) -> tuple[str | None, ...] | None:
+    """The units in a row of cells (k,) above numbers, in brackets or not, None where a cell is empty or words.
+
+    None for the row if fewer than two thirds of its cells but the first are units.
+    """
+    bare = [cell.strip("[]() ") for cell in cells]
+    units = [unit_of(cell) or (cell if len(cell) > 1 and _is_unit(cell) else None) for cell in bare]
+    filled = [unit for cell, unit in zip(bare[1:], units[1:], strict=True) if cell]
+    if not filled or 3 * sum(unit is not None for unit in filled) < 2 * len(filled):
         return None
-    return tuple(unit_of(cell) or None for cell in cells)
+    return tuple(units)
+
+
+def _is_unit(text: str) -> bool:
+    """True for a unit of any quantity."""
+    try:
+        parse_unit(text)
+    except QuantityError:
+        return False
+    return True

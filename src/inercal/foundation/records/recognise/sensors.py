@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.records.guessed_units import quoted
 from inercal.foundation.records.recognise.physics import (
     G0,
     SIZES,
@@ -20,7 +19,10 @@ from inercal.foundation.records.recognise.physics import (
     norm_of,
     turns,
 )
+from inercal.foundation.records.recognise.units import quoted
 from inercal.foundation.records.recognise.words import MEASURED, Said, said, sensors_named, words_of
+
+_FULL_SCALE = 2100.0  # deg/s
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,8 @@ def sensors(
     ``values`` (n, k) are the columns, ``names`` (k,) and ``units`` (k,) what is written above them, ``t`` (n,) [s]
     the times or None, ``file`` the name of the file, which speaks where it names one sensor and there is one triad.
     """
+    if not any(names):
+        return _nameless(values, t, file)
     triads = _by_name(names, units or (None,) * len(names), values, file)
     acc = _accelerometer(triads, values)
     found = [] if acc is None else [_with_acc_unit(acc, values)]
@@ -94,6 +98,56 @@ def _by_name(names: Sequence[str], units: Sequence[str | None], values: Array, f
         if sensor != "mag":
             found.append(_Named(sensor, columns, (x[1], y[1], z[1]), reason))
     return found
+
+
+def _nameless(values: Array, t: Array | None, file: str) -> list[SensorFound]:
+    """The sensors among columns without names: three beside each other with the norm of gravity are accelerometers,
+    and a gyro those whose turns these see; of a file that is called after one sensor the only three are that."""
+    able = [
+        index
+        for index in range(values.shape[1])
+        if np.isfinite(values[:, index]).mean() > 0.9
+        and np.nanstd(values[:, index]) > 0.0
+        and not (np.diff(values[:, index]) >= 0.0).all()
+    ]
+    windows = [
+        _Named("", (k, k + 1, k + 2), (Said(), Said(), Said()), f"columns {k} to {k + 2} have no names")
+        for k in able
+        if {k + 1, k + 2} <= set(able)
+    ]
+    hints = sensors_named(file.rpartition(".")[0])
+    if len(able) == 3 and len(windows) == 1 and len(hints) == 1 and hints[0] != "mag":
+        only = replace(windows[0], sensor=hints[0], reason=f"the name says {quoted(file)}")
+        if hints[0] == "acc":
+            return [_with_acc_unit(only, values)]
+        return [_with_gyro_unit(only, None, values, t is not None, False)]
+    steady = [window for window in windows if gravity_unit(values[:, window.columns])]
+    if not steady:
+        return []
+    first = min(steady, key=lambda window: (_unlike(values[:, window.columns]), window.columns))
+    found = [_with_acc_unit(first, values)]
+    apart = [window for window in windows if not set(window.columns) & set(first.columns)]
+    rows = np.arange(len(values), dtype=float) if t is None else t
+    seen = [(turns(values[:, first.columns], values[:, window.columns], rows), window) for window in apart]
+    turned = [(fit, window) for fit, window in seen if fit is not None]
+    if turned:
+        fit, window = min(
+            turned, key=lambda each: sum(axis not in (0, k) for k, axis in enumerate(each[0].axes, 1))
+        )
+        return [*found, _with_gyro_unit(window, fit, values, t is not None, "count" in found[0].units)]
+    if len(apart) == 1:
+        gyro = _with_gyro_unit(apart[0], None, values, t is not None, "count" in found[0].units)
+        asked = gyro.question or (
+            f"Are columns {apart[0].columns[0]} to {apart[0].columns[2]} the gyro, in {gyro.units[0]}?"
+        )
+        found.append(replace(gyro, grade="guess", question=asked))
+    return found
+
+
+def _unlike(triad: Array) -> float:
+    """The ratio of the largest to the least noise of three columns, in halves of a decade."""
+    noise = np.median(np.abs(np.diff(triad, axis=0)), axis=0)
+    return float(np.round(2.0 * np.log10(max(noise.max(), 1e-12) / max(noise.min(), 1e-12))))
 
 
 def _lone(letter: str, names: Sequence[str], units: Sequence[str | None]) -> tuple[int, Said] | None:
@@ -179,6 +233,11 @@ def _with_gyro_unit(
         return SensorFound("gyro", triad.columns, (stated[0], stated[1], stated[2]), words, reason)
     if is_whole(rates):
         reason = "all are whole numbers"
+        if seen is not None and timed and abs(SIZES["deg/s"] / seen.size - 1.0) < 0.15:
+            reason += ", which by the turns that the accelerometers see are deg/s"
+            return _alike("gyro", triad, "deg/s", words, reason)
+        if triad.sensor and "gyroADC" in triad.reason and np.nanmax(np.abs(rates)) <= _FULL_SCALE:
+            return _alike("gyro", triad, "deg/s", "likely", f"{reason}, which Betaflight writes in deg/s")
         if seen is not None and timed:
             reason += (
                 f"; by the turns that the accelerometers see {SIZES['deg/s'] / seen.size:.4g} for 1 deg/s"
@@ -203,10 +262,9 @@ def _with_gyro_unit(
         return _alike("gyro", triad, "count" if beside_counts else "mdeg/s", "likely", reason)
     noise = float(np.nanmedian(np.abs(np.diff(rates, axis=0))))
     unit = "deg/s" if noise > 0.012 and reach > 5.0 else "rad/s"
-    reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}; check whether deg/s or rad/s"
-    question = (
-        f"Is the gyro in {unit}? It moves by {reach:.3g}, its noise is {noise:.2g}, and nothing else tells."
-    )
+    reason = f"the largest move is {reach:.3g} and the noise {noise:.2g}"
+    other = "rad/s" if unit == "deg/s" else "deg/s"
+    question = f"Is the gyro in {unit} or {other}? It moves by {reach:.3g}, and nothing else tells."
     return _alike("gyro", triad, unit, "guess", reason, question)
 
 

@@ -104,6 +104,8 @@ def said(name: str, beside: str | None = None) -> Said:
     brackets = re.findall(r"[\[(]((?![012]\])[^\[\]()]*(?:\([^()]*\))?)[\])]", name)
     unit = next((unit for text in (beside or "", *reversed(brackets)) if (unit := unit_of(text))), "")
     words = words_of(re.sub(r"[\[(](?![012]\])[^\])]*[\])]", " ", name))
+    if not unit and len(words) == 1 and len(words[0]) > 1 and MEASURED.get(unit_of(words[0])) == "t":
+        return Said("t", "", unit_of(words[0]), f"{words[0]} |")  # as the columns ms and micros
     if not unit:
         unit, words = _unit_at_end(words)
     if not unit and len(words) > 2 and words[-1] in "xyz":
@@ -118,7 +120,8 @@ def said(name: str, beside: str | None = None) -> Said:
         # axes by number, behind the word of a sensor
         axes = [
             place for place, word in enumerate(words)
-            if word in ("1", "2", "3") and place and place == len(words) - 1 and _sensor(words[place - 1])
+            if word in ("1", "2", "3") and place and place == len(words) - 1
+            and (_sensor(words[place - 1]) or MEASURED.get(unit) in ("acc", "gyro"))
         ]  # fmt: skip
     axis = words[axes[-1]].translate(str.maketrans("123", "xyz")) if axes else ""
     before = words[: axes[-1]] if axes else words
@@ -131,6 +134,8 @@ def said(name: str, beside: str | None = None) -> Said:
     if not axes and any(re.fullmatch(_TIME, word) for word in words):
         sensor = "t"
     measures = MEASURED.get(unit, "")
+    if measures == "t" and len(words) == 1 and axes:
+        return Said("t", "", unit, f"{axis} |")  # an abscissa
     if measures in ("acc", "gyro", "mag") and axis and sensor != "other":
         sensor = measures
     elif measures in ("t", "temperature") and not axes:

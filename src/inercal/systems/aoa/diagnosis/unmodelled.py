@@ -94,14 +94,15 @@ def _axis(recording: Recording, settings: AoaSettings) -> list[Finding]:
     plain = estimate(part, posed(settings, part.spatial))
     worst: tuple[float, str, AngleEffect] | None = None
     for k, name in enumerate(settings.layout.names):
+        turned = with_axis(settings, k, LIMITS.unseen_axis)
+        found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
+        if found is None or not found.ratio > max(LIMITS.unseen_sigmas, worst[2].ratio if worst else 0.0):
+            continue
         for size in (LIMITS.unseen_axis, -LIMITS.unseen_axis):  # it may be off already, and back is no error
-            turned = with_axis(settings, k, size)
-            found = effect(plain, estimate(part, posed(turned, part.spatial)), part.t)
-            if found is None or not found.ratio > LIMITS.unseen_sigmas:
-                continue
-            then = fit_quality(part, turned)
-            if (worst is None or found.shift > worst[0]) and (then.fits or then.misfit <= as_stated):
+            then = fit_quality(part, with_axis(settings, k, size))  # back it shifts by as much
+            if then.fits or then.misfit <= as_stated:
                 worst = found.shift, name, found
+                break
     if worst is None:
         return []
     shift, name, found = worst

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,13 +12,11 @@ from inercal.foundation.arrays import Array
 from inercal.systems.aoa.band import WHOLE, Band
 from inercal.systems.aoa.fusion.model import BIASES, Constants, Model, Places
 from inercal.systems.aoa.layout import Layout
+from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.settings import AoaSettings
 
 START = np.array([0.1, 0.5, 20.0, 200.0])
 """Standard deviations of angle [rad], rate, acceleration and jerk where the filter starts."""
-
-_ROLL_U = math.radians(0.1)
-"""Standard uncertainty of a roll at the start that is stated without one, where it is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +107,7 @@ def problem(
         add("delay", np.array([[prior.gyro_delay**2]]), "tau_g")
     roll = settings.attitude.roll
     if spatial:
-        of_roll = _ROLL_U if roll is None or roll.u == 0.0 else roll.u
+        of_roll = LIMITS.roll_u if roll is None or roll.u == 0.0 else roll.u
         variances = [of_roll**2, noise.gyro_bias**2, noise.gyro_bias**2]
         add("roll", np.diag(variances), *_TURNING)
     size = len(names)

@@ -15,6 +15,9 @@ class Limits:
     delay_segments: int = 4
     """Segments of a spectrum without which there is no coherence to speak of."""
 
+    line_periods: float = 2.25
+    """Periods of the strongest line in a segment: the mean that is taken off leaks into the lowest bins."""
+
     delay_chance: float = 1e-6
     """Probability that a spectrum of noise alone has a frequency that counts as coherent."""
 

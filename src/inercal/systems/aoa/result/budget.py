@@ -6,24 +6,32 @@ on homogeneous functions):
 
     P_s = q_s dP/dq_s        sum_s P_s = P
 
-The filter is run again with each variance a little larger, over the beginning of a long recording: it costs as many
-runs as there are sources.
+Of a variance of the noise the filter is run again with it a little larger, over the beginning of a long recording. Of
+priors of constants, with covariances Pi_s that make Pi, one run has all: the estimate changes with their means by
+P Pi^-1, so that
+
+    P_s = P Pi^-1 Pi_s Pi^-1 P
+
+as long as no constant wanders or fades, and the angle is from the rows before. The last source is what is left.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.budget import BudgetItem
+from inercal.systems.aoa.fusion import loop
 from inercal.systems.aoa.fusion.band import fused
 from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.problem import problem as stated_problem
-from inercal.systems.aoa.fusion.run import advance, initial
+from inercal.systems.aoa.fusion.run import FusionTrace, advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later
@@ -91,23 +99,28 @@ def parts(
     judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
-    changed = [_enlarged(problem, rows, each) for each in of]
+    plain = _run(problem, t, rows, smoothed, judged, heads=True)
+    priors = {} if smoothed else _of_priors(problem, t, rows, judged, of, plain.trace)
+    rerun = [source for source in of[:-1] if source.name not in priors]
+    changed = [_enlarged(problem, rows, source) for source in rerun]
     # neither gravity nor a stated roll is a state of the filter: their errors move the estimate
     changes = leans(settings, problem.spatial)
     moved = [(leaning(problem, each, settings), rows) for each in changes]
     with ThreadPoolExecutor() as pool:
-        cases = [(problem, rows), *changed, *moved]
-        runs = pool.map(lambda case: _run(case[0], t, case[1], smoothed, judged), cases)
-        (angle, P, x, theta), *others = runs
-    variances: list[tuple[BudgetSource, Array]] = []
-    for source, (by, spread, *_) in zip(of, others[: len(of)], strict=True):
-        slope = np.append(by - angle, np.diag(spread - P)[at]) / _STEP
-        variances.append((source, np.maximum(slope, 0.0)))
+        cases = [*changed, *moved]
+        others = list(pool.map(lambda case: _run(case[0], t, case[1], smoothed, judged), cases))
+    parts_of = dict(priors)
+    for source, run in zip(rerun, others[: len(rerun)], strict=True):
+        slope = np.append(run.angle - plain.angle, np.diag(run.P - plain.P)[at]) / _STEP
+        parts_of[source.name] = np.maximum(slope, 0.0)
+    left = np.append(plain.angle, np.diag(plain.P)[at]) - sum(parts_of.values())
+    parts_of[of[-1].name] = np.maximum(left, 0.0)
+    variances: list[tuple[BudgetSource, Array]] = [(source, parts_of[source.name]) for source in of]
     shifts: list[tuple[BudgetSource, Array]] = []
     by_gravity: Array | None = None
-    for lean, (_, _, state, turned) in zip(changes, others[len(of) :], strict=True):
-        apart = (turned - theta)[np.isfinite(turned - theta)]
-        slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (state - x)[at]) / lean.step
+    for lean, run in zip(changes, others[len(rerun) :], strict=True):
+        apart = (run.theta - plain.theta)[np.isfinite(run.theta - plain.theta)]
+        slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (run.x - plain.x)[at]) / lean.step
         if lean.name == "gravity":
             by_gravity = slope[1:]
             shifts += [
@@ -122,6 +135,51 @@ def parts(
     for _, shift in shifts:
         common += np.outer(shift[1:], shift[1:])
     return AngleVariances(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
+
+
+def _of_priors(
+    problem: FusionProblem,
+    t: Array,
+    rows: Array,
+    judged: Mask,
+    of: Sequence[BudgetSource],
+    trace: FusionTrace,
+) -> dict[str, Array]:
+    """Parts (1 + p,) of the variances of theta, its mean, and of the coefficients, of sources that are priors of
+    constants alone, by name; none where constants wander or fade, or where the filter started anew. ``trace`` is that
+    of the filter, with its heads."""
+    constants, at = problem.constants, list(problem.nuisances.values())
+    if constants.accelerometer_walk or constants.gyro_walk or len(trace.starts) != 1:
+        return {}
+    if any(head.F is not None for head in trace.heads) or problem.spatial:
+        return {}
+    known = [k for k in at if problem.covariance[k, k] > 0.0]
+    inverse = np.linalg.pinv(problem.covariance[np.ix_(known, known)], hermitian=True, rcond=1e-12)
+    roots = {}
+    for source in of:
+        own = [problem.names.index(name) for name in source.states]
+        if own and {*own} <= {*known} and not (source.constants or source.levels or source.zero):
+            there = [known.index(k) for k in own]
+            values, axes = np.linalg.eigh(problem.covariance[np.ix_(own, own)])
+            roots[source.name] = inverse[:, there] @ (axes * np.sqrt(np.maximum(values, 0.0)))
+    total, count = dict.fromkeys(roots, 0.0), 0
+    memory = loop.memory(BLOCK, problem.size, len(problem.places.moving), problem.count)
+    out, dt = np.empty((BLOCK, loop.OUTPUTS + problem.count + 1)), np.diff(t, prepend=t[:1])
+    dt[trace.starts[0].row] = 0.0
+    for block, before, _ in trace.heads:
+        belief = loop.Belief(*(part.copy() for part in before))
+        done = loop.advance(belief, loop.FusedRows(dt[block], rows[block]), problem.model, out, memory=memory)
+        seen = judged[block][:done] & np.isfinite(out[:done, 1])
+        theta = memory.after[:done, 1, known] + constants.common_delay * memory.after[:done, 2, known]
+        for name, by in roots.items():
+            total[name] += float(np.sum(np.square(theta[seen] @ by)))
+        count += int(seen.sum())
+    return {
+        name: np.append(
+            total[name] / max(count, 1), np.sum(np.square(belief.P[np.ix_(at, known)] @ by), axis=1)
+        )
+        for name, by in roots.items()
+    }
 
 
 def sources(problem: FusionProblem, settings: AoaSettings) -> tuple[BudgetSource, ...]:
@@ -188,14 +246,26 @@ def _known_before(problem: FusionProblem, settings: AoaSettings) -> tuple[str, .
     )
 
 
+class _BudgetRun(NamedTuple):
+    """One run: mean variance of theta ``angle`` [rad^2], covariance ``P`` and state ``x`` at the end, ``theta`` (k,) at
+    the rows that are judged, and the ``trace`` of the filter."""
+
+    angle: float
+    P: Array
+    x: Array
+    theta: Array
+    trace: FusionTrace
+
+
 def _run(
-    problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask
-) -> tuple[float, Array, Array, Array]:
-    """Mean variance of theta [rad^2], covariance and state at the end, theta at the rows that are ``judged`` (n,)."""
-    state, trace = advance(initial(problem), problem, t, rows, last=True, block=BLOCK if smoothed else 0)
+    problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask, heads: bool = False
+) -> _BudgetRun:
+    """Run the fusion, with heads of blocks in its trace where they are asked for."""
+    block = BLOCK if smoothed or heads else 0
+    state, trace = advance(initial(problem), problem, t, rows, last=True, block=block)
     out = smooth(problem, t, rows, trace) if smoothed else trace.out
     u = out[judged & np.isfinite(out[:, 1]), 1]
-    return float(np.mean(np.square(u))), state.P, state.x, out[judged, 0]
+    return _BudgetRun(float(np.mean(np.square(u))), state.P, state.x, out[judged, 0], trace)
 
 
 def _enlarged(problem: FusionProblem, rows: Array, source: BudgetSource) -> tuple[FusionProblem, Array]:

@@ -34,8 +34,7 @@ from inercal.foundation.units import Unit, parse_unit
 from inercal.systems.aoa.angles import Angles, gives_alpha, stated_roll
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording
-from inercal.systems.aoa.result.balance import Joined
-from inercal.systems.aoa.result.points import Point
+from inercal.systems.aoa.result.points import Joined, Point
 from inercal.systems.aoa.settings import AoaSettings
 
 

@@ -35,9 +35,8 @@ from inercal.systems.aoa import task
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.result.carry_over import posterior_of
 from inercal.systems.aoa.result.columns import points_record
-from inercal.systems.aoa.runs.outcome import assemble
+from inercal.systems.aoa.runs.outcome import AtPoint, OscillationRuns, assemble, by_point, oscillations
 from inercal.systems.aoa.runs.run_table import Run, RunTable
-from inercal.systems.aoa.runs.summary import AtPoint, OscillationRuns, by_point, oscillations
 from inercal.systems.aoa.settings import GYROS, AoaSettings, Zero
 from inercal.systems.aoa.task import Measurement
 

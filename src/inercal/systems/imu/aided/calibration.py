@@ -6,7 +6,7 @@ The estimate of a calibration on a table: values, covariance, budget, tables, co
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.findings import Finding, Status, settled
+from inercal.foundation.inference.plausible import implausible
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
 from inercal.foundation.records.places import counted
@@ -22,6 +23,7 @@ from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Basis, Formula, conditions_of, studied
 from inercal.foundation.results.budget import TypeB, combine
 from inercal.foundation.results.result import Estimate, timed
+from inercal.foundation.units import RAW
 from inercal.systems.imu.aided.blocks import Blocks, cut
 from inercal.systems.imu.aided.coefficients import (
     circumstances_of,
@@ -37,6 +39,7 @@ from inercal.systems.imu.aided.diagnosis.examination import misfits
 from inercal.systems.imu.aided.diagnosis.fit_quality import knocks
 from inercal.systems.imu.aided.diagnosis.gross import agreement, cures, expected, lag, tells, travel
 from inercal.systems.imu.aided.fit import AidedFit, fit
+from inercal.systems.imu.aided.judged import judged_table
 from inercal.systems.imu.aided.model import side_of, unknowns
 from inercal.systems.imu.aided.table import TableMotion, motion_of, shifted, times, values_of
 from inercal.systems.imu.aided.verdict import findings, scatter, verdict
@@ -111,6 +114,8 @@ def assemble(
             *earlier,
             *motion.findings,
             *findings(fit, lag, faulty, judged[0] is Status.OK, geometry),
+            *_of_values(fit, names, values, plain.u, settings.site.gravity),
+            *judged_table(fit, names, values, plain.u, rows, motion, settings.site.gravity, faulty),
         ),
         statistics=_statistics(fit, rests),
         result={
@@ -122,6 +127,23 @@ def assemble(
             "unit": symbols,
         },
     )
+
+
+def _of_values(
+    fit: AidedFit, names: tuple[str, ...], values: Array, u: Array, gravity: float
+) -> Iterator[Finding]:
+    """Values that cannot be; of outputs in counts only what needs no unit."""
+    about: dict[str, float] = {}
+    for triad, letter in (("acc", "K1"), ("gyro", "S")):
+        if triad in fit.identified:
+            unit = of_triad(fit, triad)[0].side.blocks.triad.unit
+            about |= {
+                f"{letter}_{axis}": 0.0 if unit.dimension in RAW else 1.0 / unit.factor for axis in "xyz"
+            }
+    angles = [name for name in names if name.startswith(("M_", "T_"))]
+    by_name = dict(zip(names, values.tolist(), strict=True))
+    full = {f"K0_{axis}": gravity * by_name[f"K1_{axis}"] for axis in "xyz"}
+    return implausible(names, values, u, about, angles, full)
 
 
 def _basis(record: Record, settings: ImuSettings, conditions: Mapping[str, Any] | None = None) -> Basis:

@@ -1,1 +1,1 @@
-"""Ferraris calibration of an IMU: six positions on a level surface and three turns by a known angle."""
+"""Calibration of an IMU after Ferraris, six sides and three turns: a shorthand of one from sections."""

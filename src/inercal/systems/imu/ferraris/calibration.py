@@ -1,92 +1,41 @@
-"""Ferraris calibration of an IMU: a recording and settings in, an estimate out.
-
-Gravity carried from position to position through the gyro: a check of the sense of the turns.
-
-The turns themselves cannot tell in which sense they were made.
-"""
+"""Calibration after Ferraris: six rests on sides and three turns by a known angle, as sections of one recording."""
 
 from __future__ import annotations
 
-import itertools
+import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
-from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.errors import RecordError, StudyError
-from inercal.foundation.geometry.rotations import angle_between
+from inercal.foundation.findings import EVERYTHING, Finding, Status, settled
 from inercal.foundation.records.column import Triad
-from inercal.foundation.records.record import Record
+from inercal.foundation.records.places import counted_names
+from inercal.foundation.records.record import Record, recorded_temperature
+from inercal.foundation.results.basis import studied
 from inercal.foundation.results.result import Estimate, timed
-from inercal.systems.imu.ferraris.gravity_transfer import is_recorded
-from inercal.systems.imu.ferraris.method import Matrices, matrices
-from inercal.systems.imu.ferraris.names import POSITIONS
-from inercal.systems.imu.ferraris.outcome import assemble, without_sections
-from inercal.systems.imu.ferraris.readings import SectionReadings, read_sections
-from inercal.systems.imu.ferraris.scatter import Scatter, judge
-from inercal.systems.imu.ferraris.sections import Sections, find_sections
-from inercal.systems.imu.ferraris.uncertainty import propagation
-from inercal.systems.imu.ferraris.verdict import (
-    contradictions,
-    scatter_findings,
-    sense_finding,
-    unused_labels,
-    wrong_axes,
-)
+from inercal.systems.imu.ferraris.closed_form import imucal_coefficients
+from inercal.systems.imu.ferraris.names import NAMES, POSITIONS, in_words
+from inercal.systems.imu.ferraris.nine import NineSections, nine_sections
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.recording import clipped_rows
-from inercal.systems.imu.settings import FerrarisSettings, ImuSettings
-from inercal.systems.imu.turns import carried, cut_turns
-
-
-def misses(acc: Triad, gyro: Triad, sections: Sections, solution: Matrices) -> tuple[float, float] | None:
-    """Root-mean-square angle [rad] between carried and measured verticals after the ways between the positions.
-
-    Returns
-    -------
-    (as stated, with all turns in the other sense), or None where the ways were not recorded.
-    """
-    order = sorted(POSITIONS, key=lambda name: int(sections.acc[name][0]))
-    f = np.array(
-        [solution.accelerometer.correct(acc.values[sections.acc[name]].mean(axis=0)) for name in order]
-    )
-    verticals = f / np.linalg.norm(f, axis=1, keepdims=True)
-    spans, clipped = [], clipped_rows(gyro)
-    for k, (here, there) in enumerate(itertools.pairwise(order)):
-        start, stop = int(sections.gyro[here][-1]), int(sections.gyro[there][0])
-        if is_recorded(gyro, clipped, start, stop):
-            spans.append((k, start, stop))
-    if len(spans) < LIMITS.fewest_transitions:
-        return None
-    turns = cut_turns(gyro.t, gyro.values, np.zeros_like(gyro.values), spans)
-    model, none = solution.gyro, np.zeros((3, 3))
-    as_stated, reversed_ = (
-        carried(turns, verticals, each, none) for each in (model, replace(model, scale=-model.scale))
-    )
-    ends = verticals[turns.last]
-    return _rms(angle_between(as_stated, ends)), _rms(angle_between(reversed_, ends))
-
-
-def _rms(angles: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(angles**2)))
-
-
-@short_repr
-@dataclass(frozen=True)
-class FerrarisCalibration:
-    """An ``estimate`` and the evidence behind it: the triads, the sections found, and where all nine were there the
-    readings, the matrices of the method and the scatter of the positions."""
-
-    estimate: Estimate
-    accelerometer: Triad
-    gyro: Triad
-    sections: Sections
-    readings: SectionReadings | None = None
-    solution: Matrices | None = None
-    scatter: Scatter | None = None
+from inercal.systems.imu.sections.cutting.between import with_moves_between
+from inercal.systems.imu.sections.cutting.cut import Stretch
+from inercal.systems.imu.sections.cutting.proposal import Proposal, RecordedTriads
+from inercal.systems.imu.sections.cutting.sense import Sense, sense_of
+from inercal.systems.imu.sections.outcome import (
+    MODEL,
+    REFERENCES,
+    CalibrationFromSections,
+    of_proposal,
+)
+from inercal.systems.imu.sections.recordings import by_file
+from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.settings import COMMAND, MASKED, FerrarisSettings, ImuSettings
 
 
 def calibrate_ferraris(
@@ -94,16 +43,15 @@ def calibrate_ferraris(
     settings: ImuSettings,
     options: FerrarisSettings,
     progress: Callable[[str], None] = lambda _: None,
-) -> FerrarisCalibration:
-    """Calibrate accelerometers and gyro from six positions and three turns.
+) -> CalibrationFromSections:
+    """Calibrate accelerometers and gyro from six rests on sides and three turns.
 
     Parameters
     ----------
     record : Record
         ``acc_x..z`` and ``gyro_x..z`` in any unit, counts included; perhaps labels.
     settings : ImuSettings
-        Site, clock and what goes with the result; of earth rate the vertical part is taken off where the latitude is
-        given, else it is part of the uncertainty.
+        Site, clock and what goes with the result.
     options : FerrarisSettings
         The turns, alignment and sections.
     progress : callable
@@ -111,66 +59,69 @@ def calibrate_ferraris(
 
     Returns
     -------
-    FerrarisCalibration
-        Its estimate holds the 33 coefficients of `inercal.systems.imu.ferraris.method.NAMES`, in the frame of the
-        positions: its axis x is the mean of the upward direction in x_p and the downward one in x_a. Turns are positive
-        about the positive axis by the right-hand rule. The status says whether the values can be used.
+    CalibrationFromSections
+        In the frame of the sides. Turns are positive about the positive axis by the right-hand rule. The estimate's
+        ``result`` has under ``imucal`` what that program makes of the same sections.
 
     Raises
     ------
     InputError
         No accelerometer or gyro triad, a sensor that never changes, or sections that do not fit the record.
     """
-    import scipy.optimize  # (loading it is not part of the computation)
-    import scipy.special  # noqa: F401
-
     clock = time.perf_counter()
-    acc, gyro = _stamped(record.triad("acc")), _stamped(record.triad("gyro"))
-    if record["acc_x"].t is record["gyro_x"].t:
-        gyro = replace(gyro, t=acc.t)
-    _check(acc)
-    _check(gyro)
+    for sensor in ("acc", "gyro"):
+        _check(record.triad(sensor))
     if options.turn == 0.0:
         raise StudyError("imu.ferraris.turn", "found 0, expected an angle other than 0")
     progress("finding the sections")
-    sections = find_sections(record, acc, gyro, options)
-    if sections.missing:
-        estimate = without_sections(record, acc, sections, settings)
-        return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections)
-    readings = read_sections(acc, gyro, sections, settings.site, options)
-    wrong = list(wrong_axes(readings.inputs, readings.weights))
-    if wrong:
-        estimate = without_sections(record, acc, sections, settings, wrong)
-        return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections)
-    solution = matrices(readings.inputs, readings.weights)
-    carried = misses(acc, gyro, sections, solution)
-    turns = sections.turns
-    against = list(contradictions((acc, gyro), solution, carried, options))
-    if turns is not None:
-        against += turns.against
-    progress("carrying the uncertainties")
-    scatter = judge(readings, solution, settings.site, options)
-    findings = [
-        *against,
-        *(() if turns is None else turns.findings),
-        *readings.findings,
-        *unused_labels(sections),
-        *([] if against else sense_finding(solution, carried, options)),
-        *scatter_findings(scatter, options),
-    ]
-    errors = propagation(readings, solution, scatter)
-    estimate = assemble(record, (acc, gyro), sections, errors, settings, options, against, findings)
-    return FerrarisCalibration(timed(estimate, clock), acc, gyro, sections, readings, solution, scatter)
+    (file,) = by_file([record])
+    nine = nine_sections(record, file, options)
+    if nine.missing:
+        found = CalibrationFromSections(_without(record, nine, settings), ())
+        return replace(found, estimate=timed(found.estimate, clock))
+    if _run_into_each_other(nine, record):
+        record = _with_a_clock_that_goes_on(record)
+        nine = nine_sections(record, file, options)
+    if options.sections:
+        record = replace(record, labels=())  # the study names other rows
+    proposal = Proposal.by(with_moves_between(nine.rows), {file: record})
+    moves = [one.move for one in proposal.moves]
+    sense = sense_of(proposal.sections, moves, 1.0 / record.triad("gyro").rate)
+    if sense.backward:
+        proposal = Proposal.by(nine.rows, {file: record}, backward=True)
+    triads = RecordedTriads.of(file, record)
+    stretches: dict[str, list[Stretch]] = {}
+    for row in nine.rows:
+        stretches.setdefault(row.section.split()[0], []).append(triads.stretch(row))
+    questions = (
+        *(one for one in nine.findings if one.harm),
+        *_useless(proposal.notes),
+        *_moving(stretches),
+        *proposal.questions,
+    )
+    questions = questions or tuple(_against(sense, options))
+    notes = [*(one for one in proposal.notes if one.code == "turn_cut"), *_unused_labels(nine)]
+    notes += [one for one in nine.findings if not one.harm]
+    notes += [] if questions else _backward(sense, options)
+    sections = tuple(_by_hand(section) for section in proposal.sections)
+    proposal = replace(proposal, sections=sections, questions=questions, notes=tuple(notes), moves=())
+    if questions:
+        found = CalibrationFromSections(_contradicted(record, questions, notes, settings), sections)
+    else:
+        temperature = recorded_temperature(record)
+        found = of_proposal(
+            proposal, [record], settings, backward=sense.backward, temperature=temperature, progress=progress
+        )
+    result = {**found.estimate.result, "found_by": nine.found_by}
+    with suppress(LinAlgError, FloatingPointError), np.errstate(divide="raise", invalid="raise"):
+        told = {name: tuple(parts) for name, parts in stretches.items()}
+        result["imucal"] = imucal_coefficients(told, options.turn, settings.site.gravity)
+    return replace(found, estimate=timed(replace(found.estimate, result=result), clock))
 
 
-def _stamped(triad: Triad) -> Triad:
-    """The triad with no values in rows without a time stamp, which get one between their neighbours."""
-    stamped = np.isfinite(triad.t)
-    if stamped.all() or not stamped.any():
-        return triad
-    rows = np.arange(len(stamped))
-    t = np.interp(rows, rows[stamped], triad.t[stamped])
-    return replace(triad, t=t, values=np.where(stamped[:, None], triad.values, np.nan))
+def _by_hand(section: Section) -> Section:
+    """The section; of a turn without the accelerometers, for the rests beside it are those of a hand."""
+    return section if section.kind == "rest" else replace(section, acc=None, acc_after=None, acc_var=None)
 
 
 def _check(triad: Triad) -> None:
@@ -185,3 +136,136 @@ def _check(triad: Triad) -> None:
         finite = values[np.isfinite(values)]
         if not finite.size or np.ptp(finite) == 0.0:
             raise RecordError(where, f"{triad.sensor}_{axis} never changes, expected a live sensor")
+
+
+def _run_into_each_other(nine: NineSections, record: Record) -> bool:
+    """True where sections share times because the clock was set back between them."""
+    ends = sorted((row.begin or 0.0, row.end or 0.0) for row in nine.rows)
+    over = any(begin < end for (_, end), (begin, _) in pairwise(ends))
+    return over and bool(np.any(np.diff(record["acc_x"].t) < 0.0))
+
+
+def _with_a_clock_that_goes_on(record: Record) -> Record:
+    """The record with time stamps that never run backward: steps that do are of the usual length."""
+    anew = {}
+    for t in {id(column.t): column.t for column in record.columns.values()}.values():
+        steps = np.diff(t)
+        usual = float(np.median(steps[steps > 0.0]))
+        anew[id(t)] = np.concatenate([t[:1], t[0] + np.cumsum(np.where(steps > 0.0, steps, usual))])
+    columns = {name: replace(column, t=anew[id(column.t)]) for name, column in record.columns.items()}
+    return replace(record, columns=columns)
+
+
+def _without(record: Record, nine: NineSections, settings: ImuSettings) -> Estimate:
+    """The estimate of a recording that lacks a section: no parameters, but which it is, and what to do."""
+    wanted = ", ".join(f"{name} ({in_words(name)})" for name in nine.missing)
+    how = {
+        "labels": "label it in the recording",
+        "study": "name it under imu.ferraris.sections",
+        "detection": "record it, or name it under imu.ferraris.sections",
+    }[nine.found_by]
+    how = how if len(nine.missing) == 1 else how.replace(" it", " them")
+    strange = f" (found the labels {counted_names(nine.strange)})" if nine.strange else ""
+    there = len(NAMES) - len(nine.missing)
+    text = f'found {there} of the nine sections, not {wanted}: {how}, or use method = "sections"{strange}'
+    return Estimate.without(
+        studied(COMMAND, settings, record.sources, MODEL, REFERENCES),
+        Status.TOO_FEW_INTERVALS,
+        text,
+        findings=(*settled(record.findings, *MASKED), *nine.findings),
+        statistics={"intervals": float(there)},
+        result={
+            "method": "sections",
+            "found_by": nine.found_by,
+            "sections": [
+                {"section": row.section, "kind": row.kind, "where": f"{row.begin:.2f} s to {row.end:.2f} s"}
+                for row in nine.rows
+            ],
+        },
+    )
+
+
+def _contradicted(
+    record: Record, questions: Sequence[Finding], notes: Sequence[Finding], settings: ImuSettings
+) -> Estimate:
+    """The estimate of a recording whose sections are not what is said of them: no parameters."""
+    return Estimate.without(
+        studied(COMMAND, settings, record.sources, MODEL, REFERENCES),
+        Status.INCONSISTENT,
+        questions[0].message,
+        findings=(*settled(record.findings, *MASKED), *questions, *notes),
+        result={"method": "sections", "sections": []},
+    )
+
+
+def _useless(notes: Sequence[Finding]) -> Iterator[Finding]:
+    """Sections of no use: without one of the nine there is no calibration."""
+    yield from (replace(one, harm=EVERYTHING) for one in notes if one.code != "turn_cut")
+
+
+def _moving(stretches: Mapping[str, Sequence[Stretch]]) -> Iterator[Finding]:
+    """Sides on which the instrument was not still."""
+    for sensor in ("acc", "gyro"):
+        sizes = {
+            name: max(
+                float(np.linalg.norm(np.var(getattr(one, sensor).values, axis=0))) for one in stretches[name]
+            )
+            for name in POSITIONS
+        }
+        usual = float(np.median(list(sizes.values())))
+        for name, size in sizes.items():
+            if size > LIMITS.position_variance * usual > 0.0:
+                text = (
+                    f"The instrument moves in {name}: {sensor} varies {math.sqrt(size / usual):.0f} times as "
+                )
+                act = "Move its ends to where it rests, or record it again."
+                yield Finding(
+                    "poor_section", f"{text}much as on the other sides.", harm=EVERYTHING, action=act
+                )
+
+
+def _against(sense: Sense, options: FerrarisSettings) -> Iterator[Finding]:
+    """Findings where the motion between the rests speaks against the turns as they are stated."""
+    if sense.denied:
+        yield Finding(
+            "sign_suspect",
+            "The motion between the rests shows that the turns were made against the stated sense.",
+            harm=EVERYTHING,
+            action=f'State imu.ferraris.turn = "{-math.degrees(options.turn):g} deg".',
+        )
+    elif sense.contradicted:
+        yield Finding(
+            "contradiction",
+            f"Gyro and accelerometers contradict each other by {math.degrees(sense.stated):.0f} deg from rest to rest.",
+            harm=EVERYTHING,
+            action="Check the order and signs of the gyro's axes, and the angle of the turns.",
+        )
+
+
+def _backward(sense: Sense, options: FerrarisSettings) -> list[Finding]:
+    """A gyro that runs against the stated sense on all axes; a negative sense of turns was stated on purpose."""
+    if not sense.backward:
+        return []
+    told = sense.stated < LIMITS.vertical_miss
+    act = "The gyro counts against the right-hand rule"
+    other = "or the sign of imu.ferraris.turn is wrong: the motion between the rests, which would tell, is not there"
+    return [
+        Finding(
+            "sign_suspect",
+            "All three gyro axes run against the stated sense of the turns, so that S is negative.",
+            harm=() if told or options.turn < 0.0 else ("gyro",),
+            action=f"{act}." if told else f"{act}, {other}.",
+        )
+    ]
+
+
+def _unused_labels(nine: NineSections) -> list[Finding]:
+    """``unused_labels``: the record is labelled, but no label names a section, so that these were detected."""
+    if nine.found_by != "detection" or not nine.strange:
+        return []
+    text = f"The labels {counted_names(nine.strange)} name no side or turn: sections were detected instead."
+    return [
+        Finding(
+            "unused_labels", text, action='State them under imu.ferraris.sections, such as x_p = "LABEL".'
+        )
+    ]

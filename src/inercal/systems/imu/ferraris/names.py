@@ -7,6 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from inercal.foundation.instruments.terms import ACCELEROMETERS_IN_A_FRAME, GYRO_G_SENSITIVITY, GYRO_TRIAD
+
+TERMS_OF_FERRARIS = (*ACCELEROMETERS_IN_A_FRAME, *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
+"""The 33 coefficients that six sides and three turns tell."""
+
 POSITIONS = ("x_p", "x_a", "y_p", "y_a", "z_p", "z_a")
 """Axis parallel (p, reads +g) and antiparallel (a, reads -g) to the specific force of rest, which is upward."""
 

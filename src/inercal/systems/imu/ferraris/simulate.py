@@ -12,8 +12,7 @@ from inercal.foundation.geometry.earth import earth_rate
 from inercal.foundation.geometry.rotations import conjugate, exp, log, multiply, rotate
 from inercal.foundation.instruments.triad import TriadModel
 from inercal.foundation.records.record import Record
-from inercal.systems.imu.ferraris.method import NAMES
-from inercal.systems.imu.ferraris.names import POSITIONS, TURNS, UP
+from inercal.systems.imu.ferraris.names import POSITIONS, TERMS_OF_FERRARIS, TURNS, UP
 from inercal.systems.imu.settings import Disturbances, FerrarisSettings, ImuSettings
 from inercal.systems.imu.simulate import (
     ImuTruth,
@@ -54,11 +53,11 @@ class SessionCourse:
 
 
 def true_values(truth: ImuTruth) -> Array:
-    """The coefficients (33,) in the order of `NAMES`."""
+    """The coefficients (33,) in the order of `TERMS_OF_FERRARIS`."""
     values = truth.values()
     M = truth.accelerometer.misalignment
     values |= {f"M_{i}{j}": float(M["xyz".index(i), "xyz".index(j)]) for i, j in ("yx", "zx", "zy")}
-    return np.array([values[name] for name in NAMES])
+    return np.array([values[name] for name in TERMS_OF_FERRARIS])
 
 
 def simulate_session(

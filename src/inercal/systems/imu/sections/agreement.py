@@ -75,7 +75,11 @@ def outlying(linear: Linear, z: Array, solution: ArrowSolution) -> Array:
             logs, volume = nodes(*mode(without, z))
             weights = weighed(np.array([without.likelihood(there) for there in logs]) + volume)
             heavy = weights > _LEAST_WEIGHT
-            found = [of_sections(*linear.left(there, linear.at(there))[0])[0][worst] for there in logs[heavy]]
+            found = [
+                of_sections(rest[None, worst], covariance[None, worst])[0][0]
+                for there in logs[heavy]
+                for rest, covariance in [linear.left(there, linear.at(there))[0]]
+            ]
         except LinAlgError:
             return out
         out[worst] = weights[heavy] @ chdtrc(told[worst], np.array(found))

@@ -199,6 +199,29 @@ class Linear:
         by_local = cells.gather @ np.einsum("ckq,mck->cqm", cells.L, weighed).reshape(-1, count)
         return np.asarray((by_shared - by_local.T @ solution.carried) @ solution.covariance)
 
+    def second_order(self, ahead: Sequence[RowBlock], step: ArrowSolution, part: float) -> Linear:
+        """The problem whose residuals are the second derivatives of those along a step, by the rows ``ahead``, a part
+        of it on."""
+        blocks = []
+        for cells, there in zip(self._blocks, (b for b in ahead if b.seen.any()), strict=True):
+            inside = np.append(step.local, 0.0)[cells.at]
+            along = (cells.A @ step.shared).reshape(cells.r.shape) + (cells.L @ inside[..., None])[..., 0]
+            change = there.residual - cells.r + part * along
+            blocks.append(replace(cells, r=2.0 / part**2 * change * cells.used))
+        out = copy(self)
+        out._blocks, out._off = blocks, np.zeros_like(self._off)
+        return out
+
+    def size(self, z: Array) -> Array:
+        """Standard deviations of the free unknowns if all others were known."""
+        weight = 1.0 / self.sd(z) ** 2
+        s = len(self.shared)
+        for cells, v in zip(self._blocks, self.variances(z), strict=True):
+            w = cells.used / v
+            weight[:s] += np.sum(w.reshape(-1, 1) * cells.A**2, axis=0)
+            weight[s:] += cells.gather @ np.sum(w[..., None] * cells.L**2, axis=1).ravel()
+        return 1.0 / np.sqrt(np.maximum(weight, 1e-300))
+
     def scores(self, z: Array, solution: ArrowSolution, effects: Array) -> tuple[Array, Array]:
         """Scores (k,) and information (k, k) of ``effects`` (k, c, 9) on the means that are no unknowns.
 

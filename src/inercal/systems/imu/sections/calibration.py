@@ -2,39 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError
 from scipy.special import chdtrc, stdtrit
 
 from inercal.foundation.arrays import Array, short_repr
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.inference.variances import degrees, second_moment, weighed
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
 from inercal.systems.imu.sections.agreement import of_placing, of_sensors, outlying
 from inercal.systems.imu.sections.arrow import ArrowSolution, Linear
 from inercal.systems.imu.sections.bends import bend
+from inercal.systems.imu.sections.fit import FittedSections, fitted, noise_of, rounded
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import misfit
 from inercal.systems.imu.sections.priors import Priors, Size
-from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of, with_classes
-from inercal.systems.imu.sections.scatters import half_widths, mode, nodes
+from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, problem_of
+from inercal.systems.imu.sections.readings import Flags
+from inercal.systems.imu.sections.scatters import half_widths, nodes
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.solve import solved
-from inercal.systems.imu.sections.start import first_guess
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, K1, LOCAL, SWIVEL, TILT, S
-
-SOFTENED: Final = (1e-3, 3e-5, 1e-6)
-"""Noise of means, as parts of the largest output, by which a fit goes from the first guess to noise far below what
-tilts do to the outputs: the valley of its sum of squares is too narrow for a straight way."""
-
-_FINEST: Final = 1e-9
-"""Noise of means, as a part of the largest output, that counts at least: rounding rules below."""
-
-_SOFT: Final = 100.0
-"""Growth of a variance up to which it makes no other valley."""
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON
 
 
 @short_repr
@@ -78,8 +69,6 @@ class SectionCalibration:
     """True where the prior of the scale factors was dropped, since the sections deny it."""
     residuals: Array
     """Outputs (n, 3 kinds, 3 axes) less those of the model."""
-    outlying: Array
-    """Probabilities (n,) that a sound section lies as far off all others."""
     placed: Array
     """Angles (n, 2) by which verticals and axes lie off what is said of them [rad], 0 where nothing is."""
     placed_sigmas: Array
@@ -89,6 +78,23 @@ class SectionCalibration:
     converged: bool
     problem: Problem
     point: Iterate
+    linear: Linear
+    z: Array
+    """The linear problem at the point, and the likeliest logarithms (c,) of the scatters."""
+    widened: float = 1.0
+    """Factor on u for residuals that are larger than what is known explains."""
+
+    @cached_property
+    def outlying(self) -> Array:
+        """Probabilities (n,) that a sound section lies as far off all others."""
+        if not self.converged:
+            return np.ones(len(self.problem.readings.sections))
+        return outlying(self.linear, self.z, self.linear.at(self.z))
+
+    @property
+    def misfit(self) -> float:
+        """Residuals over what is known of them (rms)."""
+        return float(np.sqrt(self.chi2 / self.freedom)) if self.freedom > 0.0 else 1.0
 
     def value(self, name: str) -> tuple[float, float, float]:
         """Value, u and U of a coefficient."""
@@ -102,18 +108,6 @@ class SectionCalibration:
         for k, pair in enumerate(pairs):
             A[k, self.names.index(f"T_{pair}")], A[k, self.names.index(f"M_{pair}")] = 1.0, -1.0
         return tuple(f"T - M {pair}" for pair in pairs), A @ self.x, A @ self.covariance @ A.T
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A fit: the problem with its classes, the point, the linear problem there, and the likeliest variances."""
-
-    problem: Problem
-    point: Iterate
-    linear: Linear
-    z: Array
-    spread: Array
-    converged: bool
 
 
 def calibrate_sections(
@@ -146,12 +140,30 @@ def calibrate_sections(
             continue
         if anew.converged and not contradicted(anew):
             return replace(anew, freed=other is free)
-    return found
+    return _widened(found)
+
+
+def _widened(found: SectionCalibration) -> SectionCalibration:
+    """The calibration with u as much larger as its residuals are, where these are not so large that nothing can be
+    used."""
+    if gross(found):
+        return found
+    times = found.misfit
+    return replace(
+        found, u=times * found.u, U=times * found.U, covariance=times**2 * found.covariance, widened=times
+    )
 
 
 def _freed(scale: Size | None) -> Size | None:
     """A prior of scale factors that says nothing but the unit."""
     return None if scale is None else scale._replace(spread=np.inf)
+
+
+def gross(found: SectionCalibration) -> bool:
+    """True where sections contradict what is said of them so much that nothing can be used."""
+    return contradicted(found) and (
+        found.misfit > INFERENCE.gross or max(found.beyond.values(), default=0.0) > LIMITS.beyond_scatter
+    )
 
 
 def contradicted(found: SectionCalibration) -> bool:
@@ -163,91 +175,21 @@ def contradicted(found: SectionCalibration) -> bool:
     )
 
 
-def _calibrated(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...]) -> SectionCalibration:
+def _calibrated(
+    sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ...], start: Iterate | None = None
+) -> SectionCalibration:
     """Calibrate with these priors, and with a scatter of its own for each sensor that contradicts its stated noise."""
-    problem = problem_of(sections, priors, extras)
-    found = _result(_fit(softened(problem, _FINEST) or problem))
-    new = {sensor for sensor, p in found.agreement.items() if p < LIMITS.contradiction} - priors.excess
+    fit = fitted(rounded(problem_of(sections, priors, extras)), start)
+    rest, covariance = fit.linear.left(fit.z, fit.linear.at(fit.z))[0]
+    agreement = of_sensors(fit.problem, rest, covariance)
+    new = {sensor for sensor, p in agreement.items() if p < LIMITS.contradiction} - priors.excess
     if new:
-        return _calibrated(sections, replace(priors, excess=priors.excess | new), extras)
-    return found
+        near = fit.point if fit.converged else None
+        return _calibrated(sections, replace(priors, excess=priors.excess | new), extras, near)
+    return _result(fit, agreement)
 
 
-def _fit(problem: Problem) -> _Fit:
-    """Solve, with the likeliest variances and the lengths that tilts take from verticals and axes.
-
-    Where noise is far below what coefficients and tilts do together, the valley of the sum of squares is too bent for
-    the search; what they take from lengths then counts as noise, and once more as curvature: u is on the safe side.
-    """
-    fitted = _fit_by(problem, whole=False)
-    return fitted if fitted.converged else _fit_by(problem, whole=True)
-
-
-def _fit_by(problem: Problem, *, whole: bool) -> _Fit:
-    """Solve; ``whole``: what coefficients leave open of tilts counts as noise as well."""
-    z, point = np.array([np.log(size.median) for size in problem.sizes.values()]), first_guess(problem)
-    spread, noise = np.eye(len(z)), _noise(problem, point, z)
-    problem = with_classes(problem, noise)
-    for part in SOFTENED:
-        softer = softened(problem, part)
-        if softer is not None:
-            point, _, _ = solved(softer, point, z)
-    for _ in range(3):
-        point, linear, converged = solved(problem, point, z)
-        z, spread = mode(linear, z)
-        least_known = z + 2.0 * np.linalg.norm(
-            spread, axis=1
-        )  # a scatter that may be small makes no fine instrument
-        problem = with_classes(problem, _noise(problem, point, least_known))
-        point = _shortened(problem, point, linear, linear.at(z), z, whole=whole)
-    point, linear, converged = solved(problem, point, z)
-    return _Fit(problem, point, linear, z, spread, converged)
-
-
-def softened(problem: Problem, part: float) -> Problem | None:
-    """The problem with a noise of means of at least this ``part`` of the largest outputs; None where it is no less."""
-    r = problem.readings
-    largest = np.array(
-        [np.max(np.abs(r.y[:, kinds][r.seen[:, kinds]]), initial=0.0) for kinds in ([0, 1], [2])]
-    )
-    least = (part * largest[[0, 0, 1], None]) ** 2
-    softer = np.where(r.stated, np.maximum(r.variance, least), r.variance)
-    if np.all(softer <= _SOFT * r.variance):
-        return None
-    return replace(problem, readings=replace(r, variance=softer))
-
-
-def _noise(problem: Problem, point: Iterate, z: Array) -> dict[str, float]:
-    """Scatter of the means of each sensor [SI], stated or found."""
-    scatter = dict(zip(problem.sizes, np.exp(z), strict=True))
-    r, out = problem.readings, {}
-    for name, kinds in (("acc", slice(0, 2)), ("gyro", slice(2, 3))):
-        variance = (r.variance / np.array([point.x[K1], point.x[K1], point.x[S]]) ** 2)[:, kinds]
-        for label, on in problem.on.items():
-            if label.split()[0] == name:
-                variance = variance + on[:, kinds] * scatter[label] ** 2
-        if r.seen[:, kinds].any():
-            out[name] = float(np.sqrt(np.median(variance[r.seen[:, kinds]])))
-    return out
-
-
-def _shortened(
-    problem: Problem, point: Iterate, linear: Linear, solution: ArrowSolution, z: Array, *, whole: bool
-) -> Iterate:
-    """The point with the mean and the variance of the part by which tilts that a section leaves open, within a known
-    placing, shorten what acts along a direction: (d1^2 + d2^2)/2. What coefficients leave open is for `bend`,
-    unless the ``whole`` is taken."""
-    variance, sd = np.zeros(len(problem.sd)), np.zeros(len(problem.sd))
-    variance[linear.local] = solution.local_variance if whole else np.diag(solution.given)
-    sd[linear.local] = linear.sd(z)[len(linear.shared) :]
-    left = np.where(np.isfinite(problem.local(sd)), problem.local(variance), 0.0)[problem.readings.leader]
-    parts = [left[:, TILT], left[:, SWIVEL]]
-    short = np.stack([0.5 * part.sum(axis=1) for part in parts], axis=1)
-    loss = np.stack([0.5 * np.sum(part**2, axis=1) for part in parts], axis=1)
-    return replace(point, short=short, loss=loss)
-
-
-def _result(fit: _Fit) -> SectionCalibration:
+def _result(fit: FittedSections, agreement: dict[str, float]) -> SectionCalibration:
     """Mean and covariance over what is left open of the variances, with 95 % limits of the mixture."""
     problem, linear, x = fit.problem, fit.linear, fit.point.x
     count = int(np.sum(linear.shared < len(COEFFICIENTS)))
@@ -263,7 +205,7 @@ def _result(fit: _Fit) -> SectionCalibration:
     covariances = np.array([(each.covariance + curved.covariance)[:count, :count] for each in found])
     mean = weights @ shifts
     covariance = second_moment(weights, covariances, shifts - mean)
-    J, value = _in_outputs(names, x, x[at] + mean)
+    J, value = in_outputs(names, x, x[at] + mean)
     variances = np.einsum("ij,gjk,ik->gi", J, covariances, J)
     covariance = J @ covariance @ J.T
     U = half_widths(weights, (shifts - mean) @ J.T, np.sqrt(variances))
@@ -273,12 +215,11 @@ def _result(fit: _Fit) -> SectionCalibration:
     u = U / stdtrit(dof, 0.975)
     scale = u / np.sqrt(np.diag(covariance))
 
-    budget = _budget(problem, linear, best, z, J)
+    budget = shares_of(problem, linear, best, z, J)
     left = linear.left(z, best)
     sd = linear.sd(z)[:count]
     size = np.sqrt(np.diag(covariance)) / np.abs(np.diag(J))
-    by = sum((share for source, share in budget.items() if source.startswith("prior")), np.zeros(count))
-    ruled = (size**2 > 0.5 * sd**2) | (by > 0.5)
+    ruled = ruled_by_prior(size, sd, budget)
     pulled = best.covariance[:count, :count] @ np.where(
         np.isfinite(sd), (problem.mean[at] - x[at] - mean) / sd**2, 0.0
     )
@@ -287,7 +228,6 @@ def _result(fit: _Fit) -> SectionCalibration:
     open_ends = int(np.sum(~np.isfinite(linear.sd(z))))
     freedom = float(sum(np.count_nonzero(np.einsum("ckk->ck", C)) for _, C in left) - open_ends)
     placed, sigmas = of_placing(problem, fit.point, linear, z, best)
-    means = left[0]
     return SectionCalibration(
         names=names,
         x=value,
@@ -307,21 +247,22 @@ def _result(fit: _Fit) -> SectionCalibration:
             name: float((z[k] - np.log(s.median)) / s.spread)
             for k, (name, s) in enumerate(problem.sizes.items())
         },
-        noise=_noise(problem, fit.point, z),
+        noise=noise_of(problem, fit.point, z),
         chi2=best.chi2,
         freedom=freedom,
         probability=float(chdtrc(freedom, best.chi2)) if freedom > 0.0 else 1.0,
-        agreement=of_sensors(problem, *means),
+        agreement=agreement,
         excess=problem.priors.excess,
         freed=False,
         residuals=misfit(problem, fit.point),
-        outlying=outlying(linear, z, best) if fit.converged else np.ones(len(x[problem.shared :]) // LOCAL),
         placed=placed,
         placed_sigmas=sigmas,
         pulled_rates=_pulled_rates(problem, fit.point, linear, best),
         converged=fit.converged,
         problem=problem,
         point=fit.point,
+        linear=linear,
+        z=z,
     )
 
 
@@ -338,7 +279,14 @@ def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowS
     return out
 
 
-def _in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:
+def ruled_by_prior(u: Array, sd: Array, shares: Mapping[str, Array]) -> Flags:
+    """Coefficients (p,) of whose ``u`` the sections say less than what was known before: their own ``sd``, or priors of
+    coefficients by their ``shares`` of u^2."""
+    by = sum((share for source, share in shares.items() if source.startswith("prior")), np.zeros(len(u)))
+    return np.asarray((u**2 > 0.5 * sd**2) | (by > 0.5))
+
+
+def in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array, Array]:
     """Derivatives (p, p) of the coefficients by their ``values`` (p,) in the fit, and the coefficients: G is carried as
     a rate, of which outputs see S times as much. S that is not fitted is that of the unknowns ``x``."""
     J, out = np.eye(len(names)), values.copy()
@@ -353,7 +301,7 @@ def _in_outputs(names: tuple[str, ...], x: Array, values: Array) -> tuple[Array,
     return J, out
 
 
-def _budget(problem: Problem, linear: Linear, best: ArrowSolution, z: Array, J: Array) -> dict[str, Array]:
+def shares_of(problem: Problem, linear: Linear, best: ArrowSolution, z: Array, J: Array) -> dict[str, Array]:
     """Shares (p,) of the variances of the coefficients by source."""
     of_rows, of_priors = linear.shares(z, best, J)
     out: dict[str, Array] = {}

@@ -92,8 +92,11 @@ class Rotations:
         change += (self.by_session @ (session - self.session)[..., None])[..., 0]
         if np.max(np.abs(change), initial=0.0) > reach:
             return None
-        R = exponentials(change) @ self.R if change.any() else self.R
-        return Rotations(unknowns, session, R, self.by_unknowns, self.by_session)
+        if not change.any():
+            return Rotations(unknowns, session, self.R, self.by_unknowns, self.by_session)
+        bent = np.eye(3) + 0.5 * skews(change)  # the left Jacobian, else the search would not settle
+        by = (bent @ self.by_unknowns, bent @ self.by_session)
+        return Rotations(unknowns, session, exponentials(change) @ self.R, *by)
 
 
 def increments(moves: Sequence[Move]) -> Increments:

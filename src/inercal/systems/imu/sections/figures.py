@@ -15,6 +15,7 @@ from inercal.faces.report.style import ALARM, COLOURS, envelope
 from inercal.systems.imu.sections.calibration import SectionCalibration
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.windows import Windows
+from inercal.systems.imu.sections.design import DesignedSections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
 
@@ -90,6 +91,36 @@ def _holds(calibration: CalibrationFromSections) -> list[Picture]:
             0.6 + 1.5 * len(panels),
         )
     ]
+
+
+def foretold(designed: DesignedSections) -> Picture:
+    """Sections more, by the factor to which u falls with each."""
+    shown = designed.shown
+    rows = np.arange(len(shown))
+    best = [min(one.factors.values()) for one in shown]
+    marks: list[Mark] = [
+        Dots([one.mean for one in shown], rows, "all terms, mean"),
+        Dots(best, rows, "the term it helps most", COLOURS[1], "s", filled=False),
+        Level(1.0, upright=True),
+    ]
+    return draw(
+        "One section more",
+        "Factor to which the standard uncertainty falls with each section more: of all terms in the geometric mean, "
+        "and of the term that it helps most.",
+        [
+            [
+                Panel(
+                    marks,
+                    Axis("u with it / u without", "log"),
+                    Axis(names=[one.section for one in shown]),
+                    grid="both",
+                )
+            ]
+        ],
+        0.9 + 0.22 * len(shown),
+        2,
+        "center",
+    )
 
 
 def _left(found: SectionCalibration) -> Picture:

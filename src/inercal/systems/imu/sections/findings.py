@@ -9,11 +9,15 @@ import numpy as np
 from scipy.special import chdtrc
 
 from inercal.foundation.findings import EVERYTHING, Finding, Status
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
+from inercal.foundation.inference.plausible import beyond_prior, implausible
 from inercal.foundation.records.places import counted, counted_names
 from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
-from inercal.systems.imu.sections.calibration import SectionCalibration, contradicted
+from inercal.systems.imu.sections.calibration import SectionCalibration, gross
 from inercal.systems.imu.sections.cutting.checks import direction
+from inercal.systems.imu.sections.judged import judged_sections
 from inercal.systems.imu.sections.limits import LIMITS
+from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.unknowns import G
 
 _WORDS = {
@@ -24,12 +28,13 @@ _WORDS = {
 }
 
 
-def findings_of(found: SectionCalibration) -> tuple[Finding, ...]:
-    """All that a calibration says of its sections and of itself."""
+def findings_of(found: SectionCalibration, priors: Priors) -> tuple[Finding, ...]:
+    """All that a calibration says of its sections and of itself; ``priors`` are those that were stated."""
     return (
         *_contradictions(found),
-        *_signs(found),
+        *_values(found, priors),
         *_rates(found),
+        *(judged_sections(found) if found.converged and not gross(found) else ()),
         *(() if found.problem.extras else _outlying(found)),
         *_scatters(found),
         *_placing(found),
@@ -46,7 +51,8 @@ def verdict(found: SectionCalibration, before: Sequence[Finding]) -> tuple[Statu
         return Status.INCONSISTENT, before[0].message
     if not found.converged:
         return Status.NOT_CONVERGED, f"the search from {sections} ended before it reached a minimum"
-    against = [*_contradictions(found), *_signs(found)]
+    values = _values(found, found.problem.priors)
+    against = [*_contradictions(found), *(one for one in values if one.code == "sign_suspect")]
     if against:
         return Status.INCONSISTENT, against[0].message
     return Status.OK, f"{len(found.names)} coefficients from {sections}"
@@ -61,7 +67,7 @@ def _section(found: SectionCalibration, k: int) -> str:
 def _contradictions(found: SectionCalibration) -> Iterator[Finding]:
     """Sections that contradict what is said of them."""
     sections = found.problem.readings.sections
-    if found.converged and contradicted(found):
+    if found.converged and gross(found):
         sigmas = found.placed_sigmas.max(axis=1)
         items: tuple[dict[str, str | float], ...] = tuple(
             {"section": _section(found, k), "off its place [deg]": math.degrees(found.placed[k].max())}
@@ -86,26 +92,30 @@ def _contradictions(found: SectionCalibration) -> Iterator[Finding]:
             action="Check names, units and signs of these sections, or leave one out.",
             items=items,
         )
-    if found.freed:
-        yield Finding(
-            "unit_suspect",
-            "The scale factors are far from those of the stated units, as the sections show.",
-            harm=EVERYTHING,
-            action="Check the units in the map, and the angles and rates of the sections.",
-        )
 
 
-def _signs(found: SectionCalibration) -> Iterator[Finding]:
-    """Negative scale factors: exchanged sides leave no other trace."""
-    for name, value in zip(found.names, found.x, strict=True):
-        if name.startswith(("K1_", "S_")) and value < 0.0:
-            sensor, axis = ("acc" if name.startswith("K1") else "gyro"), name[-1]
-            yield Finding(
-                "sign_suspect",
-                f"{sensor}_{axis} looks reversed: {name} is {value:.4g}.",
-                harm=EVERYTHING,
-                action=f"Check the sign of {sensor}_{axis} in the map, and whether +{axis} and -{axis} are exchanged.",
-            )
+def _expected(size: Size | None) -> float:
+    """A scale factor beforehand; where its size is not known 0, by its sign."""
+    if size is None:
+        return 0.0
+    return size.median if math.isfinite(size.spread) else math.copysign(0.0, size.median)
+
+
+def _values(found: SectionCalibration, priors: Priors) -> Iterator[Finding]:
+    """Values that cannot be: exchanged sides and other units leave no other trace."""
+    sizes = {"K1": priors.acc_scale, "S": priors.gyro_scale}
+    scales = {
+        name: _expected(sizes[head]) for name in found.names if (head := name.rpartition("_")[0]) in sizes
+    }
+    angles = [name for name in found.names if name.startswith(("M_", "T_"))]
+    g = priors.site.gravity
+    full = {f"K0_{axis}": g * found.value(f"K1_{axis}")[0] for axis in "xyz" if f"K0_{axis}" in found.names}
+    yield from implausible(found.names, found.x, found.u, scales, angles, full)
+    if priors.k2 and np.isfinite(priors.k2):
+        squares = [k for k, name in enumerate(found.names) if name.startswith("K2_")]
+        names = [found.names[k] for k in squares]
+        of_prior = np.full(len(squares), priors.k2)
+        yield from beyond_prior(names, found.x[squares], found.u[squares], of_prior, INFERENCE.value_risk)
 
 
 def _rates(found: SectionCalibration) -> Iterator[Finding]:
@@ -118,8 +128,7 @@ def _rates(found: SectionCalibration) -> Iterator[Finding]:
             f"Rates contradict each other: that of {group} differs by {size:.1f} times what was stated.",
             group,
             EVERYTHING,
-            action="Check order, values and u of the rates, whether the gyro is linear, and its g-sensitivity, "
-            "which on a level table adds the same to every rate.",
+            action="Check order, values and u of the rates, and linearity and g-sensitivity of the gyro.",
             items=tuple(
                 {"rate": name, "off [of its u]": round(float(pull), 1)}
                 for name, pull in found.pulled_rates.items()
@@ -143,6 +152,13 @@ def _outlying(found: SectionCalibration) -> Iterator[Finding]:
 
 def _scatters(found: SectionCalibration) -> Iterator[Finding]:
     """Scatters beyond the stated noise, or known by hardly more than a guess."""
+    if found.widened > 1.0:
+        yield Finding(
+            "excess_scatter",
+            f"Sections miss what is said of them by {found.widened:.2g} times its uncertainty, and u allows for it.",
+            harm=(),
+            action="State what is known of directions, rates and noise with the uncertainty that it has.",
+        )
     for sensor in sorted(found.excess):
         yield Finding(
             "excess_scatter",

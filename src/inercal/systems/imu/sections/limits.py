@@ -27,6 +27,9 @@ class Limits:
     beyond_scatter: float = 3.0
     """Logarithm of a scatter over its median beforehand, in standard deviations, beyond which no instrument has it."""
 
+    flat_scatter: float = 5.0
+    """Standard deviation of the logarithm of a scatter, in counts that nothing tells the unit of, about 1 count."""
+
     fewest_scatter_dof: float = 3.0
     """Degrees of freedom of a scatter below which it is rather what was known of it than found."""
 
@@ -56,6 +59,9 @@ class Limits:
 
     most_bends: int = 12
     """Combinations whose curvature counts at most."""
+
+    least_help: float = 0.95
+    """Factor on u by a planned section, from which on it helps a term."""
 
     # swings
 
@@ -136,6 +142,8 @@ class Limits:
 
     harmless_wander: float = 0.3
     """Angle by which a bias off its mean turns moves, over their scatter, up to which it is left to that."""
+    turned_vertical: float = math.radians(10.0)
+    """Angle [rad] between the verticals of two rests from which a gyro has to see a motion between them."""
 
     raised_u: float = 1.2
     """Growth of u of the accelerometers by moves, from which these have no say in them."""

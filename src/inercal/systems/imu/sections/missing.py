@@ -1,4 +1,4 @@
-"""Sections that are missing where those there leave a coefficient open, and the rest to add."""
+"""Sections that are missing where those there leave a coefficient open, and the one to add."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.identified import pose_words
 from inercal.systems.imu.sections.arrow import Linear
-from inercal.systems.imu.sections.calibration import SOFTENED, softened
+from inercal.systems.imu.sections.fit import SOFTENED, softened
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.outputs import centred, rows
 from inercal.systems.imu.sections.priors import Priors
@@ -24,7 +24,8 @@ from inercal.systems.imu.sections.unknowns import COEFFICIENTS, K0, K1, G, S
 
 
 class Missing(NamedTuple):
-    """Coefficients that stay open, by name, and in words the section that tells most of them."""
+    """Coefficients that stay open, by name, and in words the section to add: a rest in the direction of specific force
+    that tells most of them, a turn, or of a gyro's bias a rest in any."""
 
     terms: tuple[str, ...]
     cure: str
@@ -38,9 +39,8 @@ def missing(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
         return None
     if all(name.startswith("D_F") for name in terms):
         return Missing(terms, "a rest")
-    if all(name.startswith(("D_F", "S_")) for name in terms):
-        axes = [name[-1] for name in terms if name.startswith("S_")]
-        return Missing(terms, f"a rate or turn about {counted_names(axes)}")
+    if axes := [name[-1] for name in terms if name.startswith("S_")]:
+        return Missing(terms, f"a rate, or a turn by a known angle, about {counted_names(axes)}")
     told = any(s.kind == "rest" and s.up is not None for s in sections)
     x = first_guess(problem_of(sections, priors, extras)).x
     best, pose = np.inf, np.array([0.0, 0.0, 1.0])
@@ -64,7 +64,8 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
     linear = Linear(problem, point.x, rows(problem, point))
     z = np.array([np.log(size.median) for size in problem.sizes.values()])
     try:
-        covariance = linear.at(z).covariance
+        with np.errstate(divide="ignore", invalid="ignore"):  # what nothing tells is infinite
+            covariance = linear.at(z).covariance
     except LinAlgError:
         covariance = np.full((len(linear.shared),) * 2, np.inf)
     flat = [
@@ -77,11 +78,18 @@ def _shares(sections: Sequence[Section], priors: Priors, extras: tuple[Extra, ..
 
 
 def _full_scale(problem: Problem, p: int, x: Array) -> float:
-    """The largest output of the triad of a bias, that by g-sensitivity among them; the size of a scale factor by the
-    unknowns ``x`` (p,); 1 for any other coefficient."""
+    """The largest output of the triad of a bias, that by g-sensitivity among them; of a scale factor the largest output
+    over the largest input, or that by the unknowns ``x`` (p,); 1 for any other coefficient."""
     name, y = COEFFICIENTS[p], problem.readings.y
     if name.startswith("K0"):
         return float(np.nanmax(np.abs(y[:, :2])))
+    if name.startswith("K1"):
+        return max(float(np.nanmax(np.abs(y[:, :2]))) / problem.priors.site.gravity, 1e-12)
+    if name.startswith("S") and np.any(problem.readings.rate != 0.0):
+        moving = problem.readings.rate != 0.0
+        return max(
+            float(np.nanmax(np.abs(y[moving, 2]) / np.abs(problem.readings.rate[moving, None]))), 1e-12
+        )
     if name.startswith("D_F"):
         drift = problem.priors.site.gravity * float(np.max(problem.sd[G]) * abs(problem.mean[S][0]))
         return max(float(np.nanmax(np.abs(y[:, 2]))), 10.0 * drift, 1e-12)

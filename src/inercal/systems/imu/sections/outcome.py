@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import PurePath
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,18 +23,19 @@ from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.result import Estimate, timed
 from inercal.foundation.units import RAW, Quantity
-from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
-from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
+from inercal.systems.imu.sections.clocks import two_clocks
 from inercal.systems.imu.sections.cutting.between import SwingStretch
 from inercal.systems.imu.sections.cutting.by_hand import by_hand
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
-from inercal.systems.imu.sections.cutting.table import SectionRow, of_tables, read_table
+from inercal.systems.imu.sections.cutting.table import stated_rows
+from inercal.systems.imu.sections.effects import effects_of
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
 from inercal.systems.imu.sections.move_findings import findings_of_moves, of_channels
 from inercal.systems.imu.sections.priors import Priors, Size
+from inercal.systems.imu.sections.recordings import by_file, findings_of_records, refuse_samples, unit_of
 from inercal.systems.imu.sections.resolution import resolution_finding, with_resolution
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.shorthands import (
@@ -53,9 +54,8 @@ from inercal.systems.imu.sections.tables import (
     of_turns,
     relative_alignment,
 )
-from inercal.systems.imu.sections.trend import trend_findings
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, KnownRatesSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, ImuSettings, KnownRatesSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -102,44 +102,93 @@ def calibrate_from_sections(
     if options is None:
         ((name, record),) = named.items()
         proposal = by_hand(name, record, settings)
-        sections, method, notes = proposal.sections, "multiposition", proposal.notes
+        found = of_proposal(proposal, [record], settings, temperature=temperature, progress=progress)
+        found = _said(found, {"method": "multiposition", **_of_hand(found)})
     elif isinstance(options, SectionsSettings):
         refuse_samples(named)
-        proposal = _proposal(named, options)
-        sections = tuple(_placed(section, options) for section in proposal.sections)
-        method, notes = "sections", proposal.notes
+        found = of_proposal(
+            _proposal(named, options), records, settings, options, temperature=temperature, progress=progress
+        )
     else:
         named = {name: alone(record, options) for name, record in named.items()}
         refuse_samples(named)
         proposal = proposal_of(named, options, settings.exclude)
-        sections, method = proposal.sections, word_of(options)
-        notes = (*proposal.notes, *gyro_of_means(records, options))
-    records = list(named.values())
-    units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
-    findings = (*_of_records(records), *proposal.questions, *notes)
+        proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
+        judged = partial(effects_of, in_order=isinstance(options, KnownRatesSettings))
+        kept = list(named.values())
+        found = of_proposal(
+            proposal, kept, settings, temperature=temperature, judged=judged, progress=progress
+        )
+        found = _said(found, {"method": word_of(options)})
+    return replace(found, estimate=timed(found.estimate, clock))
+
+
+def _said(calibration: CalibrationFromSections, more: Mapping[str, Any]) -> CalibrationFromSections:
+    """The calibration with more in its result."""
+    result = {**calibration.estimate.result, **more}
+    return replace(calibration, estimate=replace(calibration.estimate, result=result))
+
+
+def _of_hand(calibration: CalibrationFromSections) -> Mapping[str, Any]:
+    """Tables of the poses and turns of a hand; none where there was no fit."""
+    found, proposal = calibration.found, calibration.proposal
+    if found is None or proposal is None:
+        return {}
+    return {"intervals": of_poses(found, proposal), "turns": of_turns(found)}
+
+
+def _nothing_more(_: SectionCalibration) -> Iterable[Finding]:
+    """No findings of a method of its own."""
+    return ()
+
+
+def of_proposal(
+    proposal: Proposal,
+    records: Sequence[Record],
+    settings: ImuSettings,
+    options: SectionsSettings = SectionsSettings(),  # noqa: B008  (frozen)
+    *,
+    backward: bool = False,
+    temperature: Quantity | None = None,
+    judged: Callable[[SectionCalibration], Iterable[Finding]] = _nothing_more,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CalibrationFromSections:
+    """Calibrate from proposed sections of records; ``backward`` is a gyro that counts against the right-hand rule,
+    ``temperature`` that of the recording, and ``judged`` finds what only some protocols ask.
+
+    Raises `InputError` for recordings in several units.
+    """
+    units = {sensor: unit_of(sensor, records) for sensor in ("acc", "gyro")}
+    sections = tuple(placed(section, options) for section in proposal.sections)
+    findings = (*findings_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
-    bases = studied(COMMAND, settings, sources, MODEL, REFERENCES)
-    none: Mapping[str, Any] = {"method": method, "sections": []}
+
+    def without(status: Status, text: str) -> CalibrationFromSections:
+        if proposal.questions:
+            status, text = Status.INCONSISTENT, proposal.questions[0].message
+        basis = studied(COMMAND, settings, sources, MODEL, REFERENCES)
+        none: Mapping[str, Any] = {"method": "sections", "sections": []}
+        return CalibrationFromSections(
+            Estimate.without(basis, status, text, findings=findings, result=none), sections
+        )
+
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(
-            timed(_by_swing(proposal.swings[0], settings, records, units, findings), clock), sections
+            _by_swing(proposal.swings[0], settings, records, units, findings), sections
         )
     if not sections:
         why = "; ".join(f"{name} {reason}" for name, reason in proposal.unused.items())
         text = why or "found no section that can be read: state them in a table, imu.sections"
-        estimate = Estimate.without(bases, Status.TOO_FEW_INTERVALS, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
-    priors = _priors(settings, units)
-    if options is None:  # a bias that wanders from pose to pose is more than noise
+        return without(Status.TOO_FEW_INTERVALS, text)
+    priors = _priors(settings, units, backward=backward)
+    if proposal.numbered:  # a bias that wanders from pose to pose is more than noise
         priors = replace(priors, excess=frozenset({"gyro"}))
-    # moves tell the gyro's scale
+    # moves tell the scale of the gyro
     lacking = missing([replace(s, gyro=None) for s in sections] if proposal.moves else sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
-        text = f"the sections leave {what} open: add {lacking.cure}"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
+        return without(Status.UNOBSERVABLE, f"the sections leave {what} open: add {lacking.cure}")
     progress("fitting the sections")
     used = 0
     try:
@@ -149,7 +198,7 @@ def calibrate_from_sections(
             findings = (
                 *findings,
                 *asked,
-                *findings_of_moves(moved, proposal.moves, numbered=options is None),
+                *findings_of_moves(moved, proposal.moves, numbered=proposal.numbered),
             )
             proposal = replace(proposal, questions=(*proposal.questions, *asked))
             used = len(moved.used)
@@ -157,33 +206,41 @@ def calibrate_from_sections(
             found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
-        estimate = Estimate.without(bases, Status.UNOBSERVABLE, text, findings=findings, result=none)
-        return CalibrationFromSections(timed(estimate, clock), sections)
-    if options is None:
+        return without(Status.UNOBSERVABLE, text)
+    findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)), *judged(found))
+    if proposal.numbered:
         found = replace(found, excess=found.excess - {"gyro"})
     if units["gyro"] is not None:
         steps = np.array(proposal.steps)
         found = with_resolution(found, steps)
         findings = (*findings, *resolution_finding(steps, units["gyro"].unit.symbol))
-    if isinstance(options, KnownRatesSettings):
-        findings = (*findings, *trend_findings(found))
     estimate = _estimate(found, settings, records, units, proposal, findings, temperature, used)
-    more: dict[str, Any] = {"method": method}
-    if options is None:
-        more |= {"intervals": of_poses(found, proposal), "turns": of_turns(found)}
-    estimate = replace(estimate, result={**estimate.result, **more})
-    return CalibrationFromSections(timed(estimate, clock), sections, found, proposal)
+    return CalibrationFromSections(estimate, sections, found, proposal)
 
 
-def _priors(settings: ImuSettings, units: Mapping[str, Triad | None]) -> Priors:
-    """Priors by what the study says of the site, the clock and the instrument."""
-    return Priors(
-        settings.site,
+def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> Priors:
+    """Priors by what the study says of the site, the clock and the instrument; ``scales`` of the scale factors of
+    ``acc`` and ``gyro``."""
+    usual = Priors(settings.site)
+    options = settings.method if isinstance(settings.method, SectionsSettings) else SectionsSettings()
+    return replace(
+        usual,
         clock_u=settings.time_base_u,
-        acc_scale=_scale(units["acc"]),
-        gyro_scale=_scale(units["gyro"]),
+        mounting_u=options.mounting_u,
+        acc_scale=scales["acc"],
+        gyro_scale=scales["gyro"],
+        misalignment=usual.misalignment if options.misalignment is None else options.misalignment,
         k2=math.inf if settings.k2 else settings.k2_u,
+        g_sensitivity=settings.g_sensitivity_u,
     )
+
+
+def _priors(settings: ImuSettings, units: Mapping[str, Triad | None], *, backward: bool = False) -> Priors:
+    """Priors by the study and the units of the outputs."""
+    acc, gyro = (_scale(units[sensor]) for sensor in ("acc", "gyro"))
+    if backward:
+        gyro = Size(-1.0, math.inf) if gyro is None else gyro._replace(median=-gyro.median)
+    return stated_priors(settings, {"acc": acc, "gyro": gyro})
 
 
 def _by_swing(
@@ -234,49 +291,6 @@ def _by_swing(
     )
 
 
-def by_file(records: Sequence[Record]) -> dict[str, Record]:
-    """The records by the names of their files."""
-    named: dict[str, Record] = {}
-    for record in records:
-        name = PurePath(record.sources[0].path).name if record.sources else "recording"
-        named[name if name not in named else f"{name} ({len(named) + 1})"] = record
-    return named
-
-
-def _unit(sensor: str, records: Sequence[Record]) -> Triad | None:
-    """A triad of the records, which tells the unit of all; None where there is none."""
-    triads = [
-        record.triad(sensor) for record in records if all(f"{sensor}_{axis}" in record for axis in "xyz")
-    ]
-    symbols = {triad.unit.symbol for triad in triads}
-    if len(symbols) > 1:
-        raise RecordError(
-            triads[-1].source.path,
-            f"found {sensor} in {' and '.join(sorted(symbols))}, expected one unit in all files",
-        )
-    return triads[0] if triads else None
-
-
-def refuse_samples(named: Mapping[str, Record]) -> None:
-    """Refuse rows without times that are samples of a recording: most of many are like the one before.
-
-    Raises `RecordError`.
-    """
-    for name, record in named.items():
-        sensor = "acc" if "acc_x" in record else "gyro"
-        if not is_counted(record) or f"{sensor}_z" not in record:
-            continue
-        values = record.triad(sensor).values
-        size = max(float(np.nanmax(np.ptp(values, axis=0))), float(np.nanmax(np.abs(values))))
-        alike = np.linalg.norm(np.diff(values, axis=0), axis=1) < 10.0 * IMU_LIMITS.same_pose * size
-        if len(values) > IMU_LIMITS.most_poses and np.mean(alike) > 0.5:
-            raise RecordError(
-                name,
-                f"found {len(values)} rows, most of them like the one before, expected one row for each pose, or of "
-                'a recording a time column t and imu.method = "sections"',
-            )
-
-
 def _scale(triad: Triad | None) -> Size | None:
     """The scale factors of physical outputs beforehand; None in counts."""
     return None if triad is None or triad.unit.dimension in RAW else Size(1.0 / triad.unit.factor, 0.05)
@@ -284,15 +298,11 @@ def _scale(triad: Triad | None) -> Size | None:
 
 def _proposal(named: Mapping[str, Record], options: SectionsSettings) -> Proposal:
     """The sections that the study states, or that recordings tell."""
-    rows: tuple[SectionRow, ...] = ()
-    if options.table is not None:
-        rows = read_table(options.table)
-    elif options.rows:
-        rows = of_tables(options.rows)
+    rows = stated_rows(options)
     return Proposal.by(rows, named) if rows else Proposal.of(named)
 
 
-def _placed(section: Section, options: SectionsSettings) -> Section:
+def placed(section: Section, options: SectionsSettings) -> Section:
     """The section with the placing and level of all where it states none."""
     turning = section.kind in ("rate", "turn")
     return replace(
@@ -301,17 +311,6 @@ def _placed(section: Section, options: SectionsSettings) -> Section:
         axis_u=options.placing if section.axis_u is None else section.axis_u,
         level_u=options.level if turning and section.level_u is None else section.level_u,
     )
-
-
-def _of_records(records: Sequence[Record]) -> tuple[Finding, ...]:
-    """Findings about the recordings; those about time do not hold for rows of means."""
-    found: dict[Finding, None] = {}
-    for record in records:
-        counted = is_counted(record)
-        sensor = "acc" if "acc_x" in record else "gyro"
-        for finding in rows_of(record, sensor)[2] if counted else record.findings:
-            found[replace(finding, harm=()) if finding.code in MASKED else finding] = None
-    return tuple(found)
 
 
 def _estimate(
@@ -352,7 +351,7 @@ def _estimate(
         found.x,
         Uncertainty(found.covariance, found.dof, budget),
         _verdict(found, proposal, moves),
-        findings=(*findings, *findings_of(found)),
+        findings=findings,
         statistics={
             "dof": found.freedom,
             "chi2": found.chi2,

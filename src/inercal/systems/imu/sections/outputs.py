@@ -39,6 +39,7 @@ from inercal.systems.imu.sections.unknowns import (
     Values,
     across,
     cross,
+    level_axes,
     matrix,
     turned,
 )
@@ -74,6 +75,7 @@ def effective(problem: Problem, x: Array) -> Array:
     earth rate may be that of a run."""
     of, readings = problem.local(x).copy(), problem.readings
     of[:, :RATE] = of[readings.leader, :RATE]
+    of[:, EARTH] = of[readings.earth_leader, EARTH]
     if readings.rate_groups:
         of[:, RATE] += np.where(
             readings.rate_group >= 0, readings.rate * x[COMMON + readings.rate_group], 0.0
@@ -168,8 +170,10 @@ def _means(problem: Problem, point: Iterate) -> RowBlock:
         run = problem.runs[section]
         shared[section, :, run : run + 3] = of_local[section, :, EARTH]
         of_local[section, :, EARTH] = 0.0
-    own = problem.shared + LOCAL * np.arange(n)[:, None] + np.arange(LOCAL)
-    lead = problem.shared + LOCAL * r.leader[:, None] + np.arange(RATE)
+    lead, own, of_earth = (
+        problem.shared + LOCAL * section[:, None] for section in (r.leader, np.arange(n), r.earth_leader)
+    )
+    at = np.hstack([lead + np.arange(RATE), own + RATE, of_earth + np.arange(LOCAL)[EARTH]])
     gain = np.abs([x[K1], x[K1], x[S]])
     variance = r.variance.copy()
     g = problem.priors.site.gravity
@@ -182,7 +186,7 @@ def _means(problem: Problem, point: Iterate) -> RowBlock:
         misfit(problem, point).reshape(n, 9),
         shared,
         of_local,
-        np.hstack([lead, own[:, RATE:]]),
+        at,
         variance.reshape(n, 9),
         {name: (on * gain**2).reshape(n, 9) for name, on in problem.on.items()},
         r.seen.reshape(n, 9),
@@ -209,7 +213,7 @@ def centred(problem: Problem, point: Iterate) -> Iterate:
         gain = x[K1][:, None] * matrix(x[M])
         felt = (r.y[r.led, 0] - x[K0]) @ np.linalg.inv(gain).T
         up[r.led] = felt / np.linalg.norm(felt, axis=1, keepdims=True)
-    level = np.concatenate([across(up), up[:, :, None]], axis=2)
+    level = level_axes(up)
     out = replace(point, x=x, up=up, axis=axis, level=level)
     for extra in problem.extras:
         out = extra.centred(problem, out)

@@ -204,6 +204,10 @@ def problem_of(sections: Sequence[Section], priors: Priors, extras: tuple[Extra,
     for extra in extras:
         runs = np.where(extra.runs >= 0, first + extra.runs, runs)
         first += len(extra.labels)
+    if priors.gyro_scale is None and not np.any(
+        shared.sd[S] > 0.0
+    ):  # outputs of a gyro whose unit nothing tells
+        priors = replace(priors, gyro_scatter=Size(1.0, LIMITS.flat_scatter))
     on, sizes = _scatters(readings, priors)
     local, placed = _local(readings, priors, bool(np.any(shared.sd[S] > 0.0)), runs)
     if placed.any():
@@ -260,7 +264,7 @@ def _shared(readings: SectionArrays, priors: Priors, extras: tuple[Extra, ...]) 
         mean[column] = 1.0
         if scale is not None:
             mean[column], sd[column] = scale.median, abs(scale.median) * scale.spread
-    if not rotated and site.latitude is None:
+    if not rotated and (site.latitude is None or priors.gyro_scale is None):
         sd[S] = sd[T] = 0.0  # no rate at all: biases alone, and G where outputs have a unit
         if priors.gyro_scale is None:
             sd[G] = 0.0
@@ -329,6 +333,7 @@ def _local(readings: SectionArrays, priors: Priors, scaled: bool, runs: Places) 
             )
     follows = readings.leader != np.arange(len(readings.sections))
     sd[follows, :RATE], placed[follows, :RATE] = 0.0, False
+    sd[readings.earth_leader != np.arange(len(readings.sections)), EARTH] = 0.0
     return sd, placed
 
 

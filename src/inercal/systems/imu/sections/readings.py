@@ -47,6 +47,8 @@ class SectionArrays:
     """Sessions, where there are several, and that of each section (n,)."""
     leader: Places
     """The first section (n,) of the same setup, whose placing is that of all of it."""
+    earth_leader: Places
+    """The first rest (n,) of the same setup where a gyro rests alone: earth rate is the same in all of them."""
     forced: Flags
     """Sections (n,) whose specific force was measured by another instrument."""
     force: Array
@@ -96,6 +98,12 @@ def side_by_side(sections: Sequence[Section]) -> SectionArrays:
         sessions, session = (), np.full(len(sections), -1)
     first: dict[str, int] = {}
     leader = [first.setdefault(s.setup, k) if s.setup else k for k, s in enumerate(sections)]
+    has_force = know_up | felt
+    lone: dict[str, int] = {}
+    earth_leader = [
+        lone.setdefault(s.setup, k) if s.setup and s.kind == "rest" and not has_force[k] else k
+        for k, s in enumerate(sections)
+    ]
     return SectionArrays(
         sections=tuple(sections),
         y=y,
@@ -113,13 +121,14 @@ def side_by_side(sections: Sequence[Section]) -> SectionArrays:
         sessions=sessions,
         session=session,
         leader=np.array(leader),
+        earth_leader=np.array(earth_leader),
         forced=forced,
         force=force,
         tied=tied,
         know_up=know_up,
         know_axis=know_axis,
         led=whole & felt & ~know_up,
-        has_force=know_up | felt,
+        has_force=has_force,
         up=up,
         axis=axis,
         channels=np.array([[seen[:, kind, i].any() for i in range(3)] for kind in (0, 2)]),
@@ -140,9 +149,9 @@ def _groups(names: list[str]) -> tuple[tuple[str, ...], Places]:
 
 def _swung(section: Section) -> tuple[float, float]:
     """Mean cosine and sine of the angle: of a turn as told, or at a steady rate."""
-    if section.kind == "rest" or (section.kind == "turn" and section.angle == 0.0):
-        return 1.0, 0.0
     if section.kind == "rate":
         return 0.0, 0.0
+    if section.kind != "turn" or section.angle == 0.0:
+        return 1.0, 0.0
     a = section.angle
     return section.cosine_sine or (np.sin(a) / a, (1.0 - np.cos(a)) / a)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Kind = Literal["rest", "rate", "turn"]
+
+SENSED: Final[Mapping[Kind, tuple[str, ...]]] = {
+    "rest": ("acc", "gyro"),
+    "rate": ("gyro",),
+    "turn": ("acc", "gyro"),
+}
+"""Sensors whose means count in a section of each kind: at a rate a lever arm adds to the accelerometers."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,8 +86,11 @@ def _of_means(records: Mapping[str, Record]) -> Proposal:
 
 
 def _of_rates(records: Mapping[str, Record], options: KnownRatesSettings) -> Proposal:
-    """A rate about an unknown axis, or a rest, for each orientation; those of one file share the error of its rate, and
-    their scatter, which nobody states: what a table does to it is more than noise."""
+    """A rate about an unknown axis, or a rest, for each orientation.
+
+    Those of one file share the error of its rate, and their scatter, which nobody states: what a table does to it is
+    more than noise. Rests may all be in one pose, so that earth rate counts as the same in them.
+    """
     if len(records) != len(options.rates):
         found = f"found {counted(len(options.rates), 'rate')} for {counted(len(records), 'file')}"
         raise StudyError("imu.rates", f"{found}, expected one for each FILE, in order")
@@ -98,6 +101,8 @@ def _of_rates(records: Mapping[str, Record], options: KnownRatesSettings) -> Pro
         row = SectionRow("", name, scatter=name)
         if rate != 0.0:
             row = replace(row, kind="rate", rate=quantity_of(abs(rate), u, "deg/s"), rate_group=name)
+        else:
+            row = replace(row, setup=name)
         rows += _orientations(record, row)
     proposal = Proposal.by(_numbered(rows), records)
     return replace(proposal, sections=tuple(replace(section, gyro_var=None) for section in proposal.sections))

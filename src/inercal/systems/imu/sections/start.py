@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.foundation.arrays import Array
 from inercal.systems.imu.sections.problem import Iterate, Problem
-from inercal.systems.imu.sections.unknowns import D_F, K0, K1, S, across
+from inercal.systems.imu.sections.unknowns import D_F, K0, K1, S, level_axes
 
 
 def first_guess(problem: Problem) -> Iterate:
@@ -47,7 +46,10 @@ def first_guess(problem: Problem) -> Iterate:
             # poses need not reach both ends of an axis: a gain that the unit tells is better known
             near = scale is not None and np.all(by_range < 1.5 * abs(typical))
             x[gain] = (by_range if moving and not near else typical) / full
-        x[gain], x[bias] = np.where(there, x[gain], 1.0), np.where(there, x[bias], 0.0)
+        fitted = there & (
+            problem.sd[gain] > 0.0
+        )  # no range of outputs tells the scale of a gyro that never turned
+        x[gain], x[bias] = np.where(fitted, x[gain], problem.mean[gain]), np.where(there, x[bias], 0.0)
         way = (y - x[bias]) / x[gain] * np.where(size[used] < 0.0, -1.0, 1.0)[:, None]
         size_of = np.linalg.norm(way, axis=1, keepdims=True)
         way = np.where(size_of > 0.0, way / np.where(size_of > 0.0, size_of, 1.0), [0.0, 0.0, 1.0])
@@ -64,9 +66,4 @@ def first_guess(problem: Problem) -> Iterate:
         base[unknown] = base[r.leader[unknown]]
     unsaid = r.tied & ~r.know_axis & ~r.forced
     up[unsaid] = axis[unsaid] * np.where(np.sum(up * axis, axis=1) < 0.0, -1.0, 1.0)[unsaid, None]
-    return Iterate(x, up, axis, _level(up), np.zeros((n, 2)), np.zeros((n, 2)))
-
-
-def _level(up: Array) -> Array:
-    """Axes of earth rate (n, 3, 3) in columns: two across the vertical, and that."""
-    return np.concatenate([across(up), up[:, :, None]], axis=2)
+    return Iterate(x, up, axis, level_axes(up), np.zeros((n, 2)), np.zeros((n, 2)))

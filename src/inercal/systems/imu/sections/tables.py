@@ -12,7 +12,7 @@ from inercal.foundation.results.budget import BudgetItem
 from inercal.systems.imu.sections.calibration import SectionCalibration
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.moves import MoveRows
-from inercal.systems.imu.sections.with_moves import directions_of
+from inercal.systems.imu.sections.with_moves import verticals_of
 
 
 def of_moves(proposal: Proposal) -> list[Mapping[str, Any]]:
@@ -74,7 +74,7 @@ def of_sections(found: SectionCalibration) -> list[Mapping[str, Any]]:
 
 def of_poses(found: SectionCalibration, proposal: Proposal) -> list[Mapping[str, Any]]:
     """One row for each pose of a hand: its times, its direction, and what the fit leaves of the size of its force."""
-    up, rows = directions_of(found), {row.section: row for row in proposal.rows}
+    up, rows = verticals_of(found), {row.section: row for row in proposal.rows}
     scale = np.array([found.value(f"K1_{axis}")[0] for axis in "xyz"])
     left = np.sum(found.residuals[:, 0] / scale * up, axis=1)
     return [

@@ -62,12 +62,18 @@ def calibrate_with_moves(
     LinAlgError
         Too little is known for any solution.
     """
-    left_out = not_whole(moves)
-    used = tuple(k for k in range(len(moves)) if k not in {each.move for each in left_out})
     alone = calibrate_sections([replace(s, gyro=None, gyro_var=None) for s in sections], priors)
+    left_out = not_whole(moves)
+    whole = [k for k in range(len(moves)) if k not in {one.move for one in left_out}]
+    left_out += tuple(
+        MoveLeftOut(whole[one.move], one.why)
+        for one in not_seen([moves[k] for k in whole], sections, priors, verticals_of(alone))
+    )
+    used = tuple(k for k in range(len(moves)) if k not in {one.move for one in left_out})
     kept = [moves[k] for k in used]
-    if not kept:  # counts without a rate have no scale
-        joint = alone if priors.gyro_scale is None else calibrate_sections(sections, priors)
+    if not kept:
+        no_scale = priors.gyro_scale is None and not _turned(sections)
+        joint = alone if no_scale else calibrate_sections(sections, priors)
         return CalibrationWithMoves(joint, alone, used, left_out, (), rescaled=False)
     scaled, rescaled, channels = _scaled(sections, kept, priors, alone)
     if channels is not None:
@@ -113,17 +119,58 @@ def not_whole(moves: Sequence[Move]) -> tuple[MoveLeftOut, ...]:
     return tuple(out)
 
 
+def not_seen(
+    moves: Sequence[Move], sections: Sequence[Section], priors: Priors, up: Array
+) -> tuple[MoveLeftOut, ...]:
+    """Moves in which the verticals ``up`` (n, 3) of rests turn by far more than the gyro did: rows are missing. Where
+    nothing tells the size of the gyro's outputs, and no vertical turns, all: they leave its scale open."""
+    if not moves:
+        return ()
+    bias = _rest_bias(sections)
+    swept = np.array(
+        [float(np.sum(np.linalg.norm(move.gyro[1:] - bias, axis=1) * np.diff(move.t))) for move in moves]
+    )
+    cosine = [np.clip(up[move.first] @ up[move.last], -1.0, 1.0) for move in moves]
+    angle = np.arccos(cosine)
+    # by the largest sweep, not by the stated unit: a wrong unit makes all of them small, and is named as such
+    least = float(np.max(swept)) / LIMITS.largest_sweep
+    missing = (angle > LIMITS.turned_vertical) & (swept < 0.5 * least * angle)
+    out = [
+        MoveLeftOut(int(k), "the vertical turns and the gyro does not: rows are missing")
+        for k in np.flatnonzero(missing)
+    ]
+    if (
+        priors.gyro_scale is None
+        and not _turned(sections)
+        and not np.any((angle > LIMITS.turned_vertical) & ~missing)
+    ):
+        open_still = "it turns about the vertical, which leaves the scale of a gyro in counts open"
+        out += [MoveLeftOut(int(k), open_still) for k in np.flatnonzero(~missing)]
+    return tuple(out)
+
+
+def _turned(sections: Sequence[Section]) -> bool:
+    """True where sections other than rests tell the scale of the gyro."""
+    return any(s.kind != "rest" and s.gyro is not None for s in sections)
+
+
+def _rest_bias(sections: Sequence[Section]) -> Array:
+    """Median output (3,) of the gyro at rest, 0 where it was never."""
+    rests = [
+        s.gyro for s in sections if s.kind == "rest" and s.gyro is not None and np.isfinite(s.gyro).all()
+    ]
+    return np.median(rests, axis=0) if rests else np.zeros(3)
+
+
 def _scaled(
     sections: Sequence[Section], moves: Sequence[Move], priors: Priors, alone: SectionCalibration
 ) -> tuple[Priors, bool, ChannelOrder | None]:
     """The priors with a scale of the gyro that carries the verticals of rests, whether what was said of it does not,
     and the order of its channels where no scale does. A scale that other sections tell needs no guess."""
-    if any(s.kind != "rest" and s.gyro is not None for s in sections):
+    if _turned(sections):
         return priors, False, None
     said = priors.gyro_scale
-    rests = np.array([s.gyro for s in sections if s.gyro is not None and np.isfinite(s.gyro).all()])
-    bias = np.median(rests, axis=0) if len(rests) else np.zeros(3)
-    coarse = CoarseMoves.of(moves, directions_of(alone), bias)
+    coarse = CoarseMoves.of(moves, verticals_of(alone), _rest_bias(sections))
     if said is not None and coarse.missed(said.median) < OF_ALL.vertical_miss:
         return priors, False, None
     best = coarse.best()
@@ -134,7 +181,7 @@ def _scaled(
     return replace(priors, gyro_scale=Size(best.scale, LIMITS.open_scale)), said is not None, None
 
 
-def directions_of(found: SectionCalibration) -> Array:
+def verticals_of(found: SectionCalibration) -> Array:
     """Directions of specific force (n, 3) of a calibration."""
     x = found.point.x
     return np.asarray(verticals(found.problem, found.point, x[:COMMON], effective(found.problem, x)).real)

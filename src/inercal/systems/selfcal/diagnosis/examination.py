@@ -29,7 +29,9 @@ from inercal.systems.selfcal.diagnosis.fit_quality import (
     white,
 )
 from inercal.systems.selfcal.diagnosis.gross import reordered_accelerometers
+from inercal.systems.selfcal.diagnosis.judged import answers, explaining, speaking
 from inercal.systems.selfcal.diagnosis.noise_check import misstated, unsteady
+from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of, periodic
 from inercal.systems.selfcal.diagnosis.rig_errors import WANDERING
 from inercal.systems.selfcal.diagnosis.rows import faults_of_rows, single_readings
 from inercal.systems.selfcal.diagnosis.small import Stated, likely, small_errors
@@ -44,19 +46,61 @@ _BEYOND = ("unit_suspect", "channel_swap", "sign_suspect")
 
 
 def diagnose(
-    recording: Recording, problem: FilterProblem, result: FilterResult, systematic: Stated = None
+    recording: Recording,
+    problem: FilterProblem,
+    result: FilterResult,
+    systematic: Stated = None,
+    passed: PlatformPass | None = None,
 ) -> list[Finding]:
     """Name what is wrong with a recording; nothing for a sound one, nor where its reading found units or axes wrong.
 
-    ``result`` is that of the study's estimator; the error-state filter judges the recording itself. No error within the
-    uncertainties of ``systematic`` inputs is named.
+    ``result`` is that of the study's estimator, ``passed`` the pass at its values, made if absent; the error-state
+    filter judges the recording itself. No error within the uncertainties of ``systematic`` inputs is named.
     """
     if any(finding.code in _BEYOND for finding in recording.findings) or not result.dims.any():
         return []
+    if passed is None and result.kind == "error-state":
+        passed = pass_of(recording, problem, result)
     try:
-        return _diagnosed(recording, problem, result, systematic)
+        if passed is None or result.kind != "error-state":
+            return _diagnosed(recording, problem, result, systematic)
+        sums = passed.with_stated(_moved(passed, systematic))
+        hits, limit = answers(sums, passed.questions)
+        said = explaining(sums, passed.z, hits, limit, passed.constants)
+        if said is not None and _fair(problem, problem, result) is problem:
+            return [said]
+        if not sound(passed.final):
+            return _diagnosed(recording, problem, result, systematic)
+        findings = _judged(passed, systematic, bool(hits))
+        if not hits or any(finding.code != "contradiction" for finding in findings):
+            return findings
+        said = speaking(sums, hits, limit, passed.constants)
+        return findings if said is None or misstated((recording, problem), passed.final) else [said]
     finally:
         forget()
+
+
+def _moved(passed: PlatformPass, systematic: Stated) -> list[FilterProblem]:
+    """The problem with each of the systematic inputs moved by its uncertainty."""
+    if systematic is None:
+        return []
+    case = passed.recording, passed.problem
+    sizes = systematic.prior * np.eye(len(systematic.parameters))
+    return [systematic.without(case, size)[1] for size in sizes]
+
+
+def _judged(passed: PlatformPass, systematic: Stated, hit: bool) -> list[Finding]:
+    """`diagnose` of a recording whose innovations are of the stated size at the final values: nothing more is filtered
+    unless a question was ``hit``, or a prior, or the size and whiteness of the innovations says that something is
+    wrong."""
+    case, problem = (passed.recording, passed.problem), passed.problem
+    fair = _fair(problem, problem, passed.result)
+    if not (hit or fair is not problem or periodic(passed) or misstated(case, passed.final)):
+        return []
+    if systematic is not None:
+        of = likely(*case, systematic)
+        fair = _fair(problem, of, filtered((passed.recording, of)))
+    return _remaining(case, fair, systematic)
 
 
 def _diagnosed(

@@ -89,8 +89,12 @@ def with_attitude(
         q, slope = encoders_at(problem, state.th, state.coefficients, rate)
         at_rest = problem.states.layout.place[TAU] - 3
         if at_rest >= 0:  # the platform may have begun to turn at this row
-            P[:3, :3] += np.outer(slope[:, at_rest], slope[:, at_rest]) * P[3 + at_rest, 3 + at_rest]
-            slope[:, at_rest] = 0.0
+            late, variance = state.coefficients[at_rest], P[3 + at_rest, 3 + at_rest]
+            if not (late < 0.0 and late**2 > 9.0 * variance):
+                c = np.where(np.arange(len(slope.T)) == at_rest, 0.0, state.coefficients)
+                q, slope = encoders_at(problem, state.th, c, rate)
+                P[:3, :3] += np.outer(slope[:, at_rest], slope[:, at_rest]) * (variance + late**2)
+                slope[:, at_rest] = 0.0
         if slope.any():
             P[:3, 3:] = slope @ P[3:, 3:]
             P[:3, :3] += P[:3, 3:] @ slope.T
@@ -119,24 +123,31 @@ def _corrected(q: Quaternion, c: Array, index: Places, x: Array) -> Quaternion:
 
 
 @kernel
-def _undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates) -> float:
+def _undecided(P: Array, c: Array, place: Places, sensor: int, read: Rates, unknown: bool) -> float:
     """Variance [rad^2] of the angle turned while it is not known on which side of a row a sensor, 0 encoders or 1
-    accelerometers, was read where the rate changes: its delay may be of either sign."""
+    accelerometers, was read where the rate changes: its delay may be of either sign. Where the rate behind the row is
+    ``unknown``, that of the whole delay, which turns as before or not."""
     at, lag = place[TAU + sensor], c[TAU + sensor]
-    if at < 0 or lag * lag > 9.0 * P[at, at]:
+    variance, w = P[at, at] if at >= 0 else 0.0, read.before
+    if unknown:
+        if lag > 0.0 and lag * lag > 9.0 * variance:
+            return 0.0
+        return float((lag * lag + variance) * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]))
+    if at < 0 or lag * lag > 9.0 * variance:
         return 0.0
     x, y, z = (
         read.after[0] - read.before[0],
         read.after[1] - read.before[1],
         read.after[2] - read.before[2],
     )
-    return float(P[at, at] * (x * x + y * y + z * z))
+    return float(variance * (x * x + y * y + z * z))
 
 
 @kernel
-def _shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
+def _shaken(P: Array, c: Array, place: Places, read: Rates, dt: float, unknown: bool) -> float:
     """Variance [m^2/s^4] of accelerometers away from the centre at a row where the rate changes, within the step of
-    ``dt`` [s] before or after: as large as the angular acceleration makes it at the places that they have."""
+    ``dt`` [s] before or after: as large as the angular acceleration makes it at the places that they have. Where the
+    rate behind the row is ``unknown``, the platform may stop there."""
     square = 0.0
     for k in range(LEVER, LEVER + 9):
         if place[k] >= 0:
@@ -146,6 +157,8 @@ def _shaken(P: Array, c: Array, place: Places, read: Rates, dt: float) -> float:
         read.after[1] - read.before[1],
         read.after[2] - read.before[2],
     )
+    if unknown:
+        x, y, z = read.before
     x, y, z = x / dt, y / dt, z / dt
     return square * (x * x + y * y + z * z)
 
@@ -198,14 +211,15 @@ def _advance(state: FilterState, model: FilterModel, steps: Steps, out: Estimate
     row, own = empty_row(WIDEST), room()
     variance = noise.accelerometer * noise.accelerometer
     history = len(out.u) > 0
-    late = place[TAU] >= 0 or place[TAU + 1] >= 0
+    late = place[TAU] >= 0 or place[TAU + 1] >= 0 or c[TAU] != 0.0 or c[TAU + 1] != 0.0
     levers, unwanted = place[LEVER] >= 0, np.empty(0)
     cosine, sigma, of_acc = 1.0, noise.encoder, variance
     q = (state.attitude[0], state.attitude[1], state.attitude[2], state.attitude[3])
     base = base_of(c, layout.based, world)
     for k in range(len(intervals)):
         dt, w = intervals[k], (rates[k, 0], rates[k, 1], rates[k, 2])
-        read = Rates(w, (later[k, 0], later[k, 1], later[k, 2]))
+        unknown, after = math.isnan(later[k, 0]), (later[k, 0], later[k, 1], later[k, 2])
+        read = Rates(w, w if unknown else after)
         f = force_within(q, w, 0.5 * dt, base.up, layout.by_force)
         rate = turning(w, f, warm[k], c, layout, own)
         q = normalize(propagate(q, rate, base.earth, dt))
@@ -228,7 +242,7 @@ def _advance(state: FilterState, model: FilterModel, steps: Steps, out: Estimate
                 out.innovations[k, i] = math.nan
         if take and seen:
             if late:
-                sigma = math.sqrt(noise.encoder * noise.encoder + _undecided(P, c, place, 0, read))
+                sigma = math.sqrt(noise.encoder * noise.encoder + _undecided(P, c, place, 0, read, unknown))
             shown = out.innovations[k, 3:] if history else unwanted
             floor = apart(noise, dt, sigma)
             roots, variances = encoder_roots(angles, world.axes, world.signs, sigma, noise.joints, floor)
@@ -241,11 +255,11 @@ def _advance(state: FilterState, model: FilterModel, steps: Steps, out: Estimate
         if take:
             expected, a = accelerometers(q, read, warm[k], base, c, layout, own)
             if late:
-                of_acc = variance + _undecided(P, c, place, 1, read) * (
+                of_acc = variance + _undecided(P, c, place, 1, read, unknown) * (
                     a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
                 )
             if levers:
-                of_acc = (of_acc if late else variance) + _shaken(P, c, place, read, dt)
+                of_acc = (of_acc if late else variance) + _shaken(P, c, place, read, dt, unknown)
             for i in range(3):
                 if history and not math.isnan(acc[k, i]) and admitted(i, gate, near):
                     of_row = SlopeRow(layout.rows[i], own.entries[i])

@@ -43,7 +43,7 @@ class Gate(NamedTuple):
 
 def _gate_of(gating: Gating | None) -> Gate:
     """The gate of the settings, off where there is none."""
-    if gating is None:
+    if gating is None or gating.rule == "off":
         return Gate(_OFF, False, 0.0, 0.0)
     return Gate(_RULES[gating.rule], gating.stops == "step", math.sin(gating.near), math.sin(gating.far))
 

@@ -70,6 +70,9 @@ def readings(recording: Recording, problem: FilterProblem) -> RowMeasurements:
     angles = np.where(seen[:, None], th, 0.0)
     attitude, joints = gimbals(angles, problem.world)
     used = np.column_stack([np.isfinite(acc), np.repeat(seen[:, None], 3, axis=1)])
+    steps = recording.steps
+    if problem.states.layout.late_encoders or problem.states.layout.moving:
+        used &= np.isfinite(steps.later)[:, [0]]  # a reading that is early may be of a platform that stops
     if problem.filter.gating is not None:
         used &= _gate(attitude, seen, problem)
     noise = problem.model.noise
@@ -84,7 +87,7 @@ def readings(recording: Recording, problem: FilterProblem) -> RowMeasurements:
         np.linalg.inv(root) * used[:, 3:, None],
         used,
         angles,
-        recording.steps,
+        steps,
     )
 
 
@@ -96,7 +99,7 @@ def _accelerometer_noise(recording: Recording, problem: FilterProblem) -> Array 
         return noise
     reach = float(np.linalg.norm(problem.prior[problem.states.layout.place[LEVER : LEVER + 9] - 3]))
     steps = recording.steps
-    change = np.linalg.norm(steps.later - steps.rate, axis=1) / steps.dt
+    change = np.linalg.norm(np.nan_to_num(steps.later) - steps.rate, axis=1) / steps.dt
     return np.asarray(np.hypot(noise, reach * change)[:, None])
 
 

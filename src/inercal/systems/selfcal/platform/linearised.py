@@ -64,6 +64,7 @@ def linearise_rows(
     own, base, columns = room(), base_of(c, layout.based, world), layout.columns
     for k in range(len(q)):
         w, later = steps.rate[k], steps.later[k]
+        later = w if math.isnan(later[0]) else later
         read = Rates((w[0], w[1], w[2]), (later[0], later[1], later[2]))
         angles = (th[k, 0], th[k, 1], th[k, 2])
         at = encoders(angles, read, base, c, layout, world, own)

@@ -16,7 +16,8 @@ from inercal.foundation.units import Quantity
 class Steps(NamedTuple):
     """Rates and measurements of m steps, as kernels take them: ``dt`` (m,) [s]; ``rate`` (m, 3) [rad/s], held over each
     step; ``acc`` (m, 3) [m/s^2] and ``th`` (m, 3) [rad] measured at its end, NaN where not; ``later`` (m, 3)
-    [rad/s] the rate of the step after it; ``warm`` (m,) [K] at its end, above the temperature of the coefficients."""
+    [rad/s] the rate of the step after it, NaN where nobody knows it; ``warm`` (m,) [K] at its end, above the
+    temperature of the coefficients."""
 
     dt: Array
     rate: Array
@@ -73,7 +74,7 @@ class Recording:
         """The n - 1 steps from row to row."""
         rate = self.rate
         warm = np.zeros(len(rate)) if self.warm is None else self.warm[1:]
-        later = np.vstack([rate[1:], np.zeros_like(rate[-1:])])  # behind the last row it may as well stop
+        later = np.vstack([rate[1:], np.full_like(rate[-1:], np.nan)])
         return Steps(self.dt, rate, self.acc[1:], self.th[1:], later, warm)
 
     @property

@@ -105,6 +105,10 @@ class Gimbals:
         return Chain(tuple(Joint(name, axis) for name, axis in zip(JOINTS, self.axes, strict=True)))
 
 
+LEANING = within(-0.5 * math.pi, 0.5 * math.pi, "an angle from -90 deg to 90 deg")
+"""Tilts of a base."""
+
+
 @dataclass(frozen=True, eq=False)
 class Base:
     """Attitude of frame b on the earth: axes of b lie along those of ``frame`` at zero heading and tilt.
@@ -123,7 +127,7 @@ class Base:
     tilt: tuple[float, float] = quantity(
         "of the base, about north and about east; may carry uncertainties; level if absent", "angle", (0.0, 0.0),
         example=["0 arcmin", "0 arcmin"], u="tilt_u", of="the one about north, the one about east",
-        bounds=within(-0.5 * math.pi, 0.5 * math.pi, "an angle from -90 deg to 90 deg"),
+        bounds=LEANING,
     )  # fmt: skip
     heading_u: float = 0.0
     tilt_u: tuple[float, float] = (0.0, 0.0)

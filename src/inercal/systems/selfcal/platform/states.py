@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.instruments.terms import term
+from inercal.foundation.units import parse_quantity
 from inercal.systems.selfcal.platform.layout import Entry, StateLayout, by_axis, entries, layout_of
 
 
@@ -35,6 +36,11 @@ class StateKind(NamedTuple):
     enters: str
     key: str = ""
     source: str = ""
+
+    @property
+    def usual(self) -> float:
+        """Their usual prior [SI]."""
+        return parse_quantity(self.prior, self.dimension, self.words).value
 
     @property
     def unit(self) -> str:

@@ -1,7 +1,7 @@
 """Uncertainty budget of the coefficients: noise, prior, and the systematic inputs of site and base.
 
-The covariance of a filter is split as that of the bounds along its path is; systematic inputs (type B) act through the
-error-state filter, run again with each changed by one standard uncertainty either way.
+The covariance of a filter is split as that of the pass at its values is; systematic inputs (type B) act through their
+columns in that pass.
 
 Latitude, gravity, heading and tilt are such inputs, each with its uncertainty and its effect.
 """
@@ -20,18 +20,18 @@ from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.foundation.units import parse_quantity, parse_unit
-from inercal.systems.selfcal.before.bounds import PathBounds
-from inercal.systems.selfcal.before.considered import sensitivities
+from inercal.systems.selfcal.before.bounds import SOURCES, PathBounds
 from inercal.systems.selfcal.diagnosis.fit_quality import Case
-from inercal.systems.selfcal.filters.averaged import averaged
-from inercal.systems.selfcal.filters.filter_result import FilterResult
+from inercal.systems.selfcal.diagnosis.passed import PlatformPass
 from inercal.systems.selfcal.filters.problem import problem
-from inercal.systems.selfcal.filters.run import estimate
+from inercal.systems.selfcal.filters.whitened import whitened
 from inercal.systems.selfcal.limits import LIMITS
-from inercal.systems.selfcal.platform.coefficients import product_slope, to_product
-from inercal.systems.selfcal.platform.recording import Recording
+from inercal.systems.selfcal.platform.coefficients import product_slope
 from inercal.systems.selfcal.platform.states import ALL, KIND_OF, STATES, UNIT_OF, WALK, WAVE
 from inercal.systems.selfcal.settings import Noise, SelfcalSettings
+
+_LARGER = 1e-5
+"""Part by which a variance is larger in a pass that shows what it does."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,27 @@ def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
     )
 
 
+def bounds_of(passed: PlatformPass) -> PathBounds:
+    """Bounds along the path of a calibration, with their parts by source: the part of a noise is the change of the
+    covariance with its variance, passes with one that is larger by `_LARGER` give that; what is left of all is that of
+    the encoders, of the prior where biases walk."""
+    whole, of, result = passed.covariance, passed.problem, passed.result
+    u, walking = np.sqrt(np.diag(result.covariance)), bool(of.states.walks.any())
+    parts = dict[str, Array]()
+    names = {"angle random walk": "angle_random_walk", "accelerometer": "accelerometer"}
+    for source, name in (names | ({"encoder": "encoder"} if walking else {})).items():
+        more = math.sqrt(1.0 + _LARGER) * getattr(of.noise, name)
+        louder = replace(of, noise=replace(of.noise, **{name: more}))
+        P = whitened(passed.recording, louder, result.coefficients, u, restarts=result.restarts).covariance
+        parts[source] = (P - whole) / _LARGER
+    prior = np.zeros_like(whole) if walking else whole / of.prior**2 @ whole
+    last = whole - sum(parts.values()) - prior
+    parts |= {"prior": last} if walking else {"encoder": last, "prior": prior}
+    slope = product_slope(result.coefficients)
+    split = {source: slope @ parts[source] @ slope.T for source in SOURCES}
+    return PathBounds(of.names, slope @ whole @ slope.T, of.prior, np.empty((0, len(u))), split)
+
+
 def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> list[TypeA | TypeB]:
     """Noise and prior, whose covariances add up to that of the filter (p, p), product form.
 
@@ -172,18 +193,16 @@ def within(covariance: Array, bounds: PathBounds, noise: Noise, dof: float) -> l
 
 
 def considered(
-    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
+    passed: PlatformPass, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
     """Errors of the rig that are no states: those stated with an uncertainty; and of each other kind the error, in
     words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
-    assert filtered.history is not None
-    of = problem(settings)
+    of = passed.problem
     known = {*of.names, *settings.model.left_out}
     named = ALL[18 : WAVE + 2 * len(of.states.harmonics)]
     left = [name for name in named if name not in known and KIND_OF[name] != "beta"]
-    along = filtered.history.attitude, filtered.coefficients
-    by_linear = sensitivities(recording, of, *along, left, restarts=filtered.restarts)
-    slopes = product_slope(filtered.coefficients) @ by_linear
+    left = [name for name in left if name in passed.errors]
+    slopes = product_slope(passed.result.coefficients) @ passed.reach(passed.of_names(tuple(left)))
     sources, exact = list[TypeB](), dict[str, tuple[float, str]]()
     for name, slope in zip(left, slopes.T, strict=True):
         stated_u = settings.model.stated.get(name, (0.0, 0.0))[1]
@@ -197,7 +216,9 @@ def considered(
             unit, size = shown_unit(UNIT_OF[name])
             exact[kind] = shift, f"{usual / shift / size:.2g} {unit} of {name} ({of.names[worst]})"
     if not known & {*ALL[WALK:]}:
-        exact |= _wandering(settings.noise, float(np.ptp(recording.t)), dict(zip(of.names, u, strict=True)))
+        exact |= _wandering(
+            settings.noise, float(np.ptp(passed.recording.t)), dict(zip(of.names, u, strict=True))
+        )
     return sources, {kind: text for kind, (_, text) in exact.items()}
 
 
@@ -220,20 +241,17 @@ def _wandering(noise: Noise, lasts: float, u: Mapping[str, float]) -> dict[str, 
 
 
 def systematic(
-    recording: Recording, settings: SelfcalSettings, filtered: FilterResult, u: Array
+    passed: PlatformPass, settings: SelfcalSettings, u: Array
 ) -> tuple[list[TypeB], Mapping[str, str]]:
     """Inputs of site and base stated with an uncertainty; and for each that is stated without one the error of it, in
     words, that does as much as one of the standard uncertainties ``u`` (p,) by noise and prior."""
     sources, exact = list[TypeB](), dict[str, str]()
-    of = problem(settings)
-    fewer, judged = averaged(recording, of, filtered)
+    of = passed.problem
     for each in systematic_inputs(settings):
         if each.of_rig:
             continue
-        by = each.u or each.step
-        moved = (replace(problem(each.changed(change)), noise=judged.noise) for change in (-by, by))
-        ends = [estimate(fewer, there, "error-state", history=False).coefficients for there in moved]
-        slope = (to_product(ends[1]) - to_product(ends[0])) / (2.0 * by)
+        ends = [passed.reach(passed.moved(problem(each.changed(by))))[:, 0] for by in (-each.step, each.step)]
+        slope = product_slope(passed.result.coefficients) @ (ends[0] - ends[1]) / (2.0 * each.step)
         worst = int(np.argmax(np.abs(slope) / u))
         if each.name == "gravity" and each.u:
             sources += [
@@ -243,8 +261,6 @@ def systematic(
             ]
         elif each.u:
             sources.append(TypeB(each.name, each.u, "rad", slope))
-        elif not np.isfinite(slope).all():
-            exact[each.name] = f"an unknown error of {each.name}, as the filter does not follow it"
         elif slope[worst] != 0.0:
             error = u[worst] / abs(slope[worst]) / parse_unit(each.unit).factor
             exact[each.name] = f"{error:.2g} {each.unit} of {each.name} ({of.names[worst]})"

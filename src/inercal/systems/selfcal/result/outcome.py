@@ -12,6 +12,7 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Status, causes
 from inercal.foundation.inference.consistency import Nis, nis
+from inercal.foundation.inference.hypotheses import sigmas
 from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN
 from inercal.foundation.records.places import counted
 from inercal.foundation.results.basis import Formula, conditions_of, studied
@@ -20,8 +21,7 @@ from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, r
 from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds
 from inercal.systems.selfcal.before.observability import Observability, not_positive, observability, useless
-from inercal.systems.selfcal.diagnosis.fit_quality import filtered as judging
-from inercal.systems.selfcal.diagnosis.small import likely
+from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of
 from inercal.systems.selfcal.estimators import ESTIMATORS, FACTOR_OF
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import problem
@@ -30,7 +30,7 @@ from inercal.systems.selfcal.platform.coefficients import NAMES, product_slope, 
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
-from inercal.systems.selfcal.result.budget import considered, stated_errors, systematic, within
+from inercal.systems.selfcal.result.budget import considered, systematic, systematic_inputs, within
 from inercal.systems.selfcal.result.unmodelled import SOURCE as UNMODELLED
 from inercal.systems.selfcal.result.unmodelled import unmodelled
 from inercal.systems.selfcal.settings import SelfcalSettings
@@ -71,9 +71,14 @@ def assemble(
     filtered: FilterResult,
     bounds: PathBounds,
     findings: Sequence[Finding] = (),
+    passed: PlatformPass | None = None,
 ) -> Estimate:
     """Put the estimate together; ``bounds`` along the path as it was estimated, with ``contributions``; ``findings`` of
-    the diagnosis, beside those of the recording."""
+    the diagnosis, beside those of the recording; ``passed`` the pass at its values, made if absent."""
+    if passed is None:
+        passed = pass_of(recording, problem(settings), filtered)
+    if passed is not None and filtered.kind == "error-state":
+        filtered = passed.final
     p, kinds = len(filtered.coefficients), list(dict.fromkeys(KIND_OF[name] for name in filtered.names))
     basis = studied(
         COMMAND,
@@ -109,18 +114,24 @@ def assemble(
     result["bounds"] = dict(zip(bounds.names, bounds.u.tolist(), strict=True))
     measured = np.isfinite(filtered.innovations)
     dof = float((measured.sum() if len(measured) else filtered.dims.sum()) - p - 3)
-    of_site, exact = systematic(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
-    of_rig, left_out = considered(recording, settings, filtered, np.sqrt(np.diag(by_filter)))
+    if passed is None:
+        text = "the covariance is numerically singular at the values of the filter: check units of noise and prior"
+        return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
+    of_site, exact = systematic(passed, settings, np.sqrt(np.diag(by_filter)))
+    of_rig, left_out = considered(passed, settings, np.sqrt(np.diag(by_filter)))
     sources = [*within(by_filter, bounds, settings.noise.of_readings, max(dof, 1.0)), *of_site, *of_rig]
-    rest = unmodelled(recording, settings, filtered, combine(filtered.names, sources).u)
+    rest = unmodelled(passed, settings, combine(filtered.names, sources).u)
     if rest is not None:
         sources.append(rest.source)
         left_out = {kind: text for kind, text in left_out.items() if kind not in rest.counted}
     uncertainty = combine(filtered.names, sources)
-    if blurred := [each.source for each in (*of_site, *of_rig) if not np.isfinite(each.covariance).all()]:
-        text = f"{', '.join(blurred)}: stated so uncertainly that no filter follows the recording; state it better"
-        return Estimate.without(basis, Status.ILL_CONDITIONED, text, findings=all_findings, result=result)
     if (unusable := not_positive(bounds.prior, uncertainty.covariance)) is not None:
+        wide = [
+            own.source for own in (*of_site, *of_rig) if (np.diag(own.covariance) > bounds.prior**2).any()
+        ]
+        if wide:
+            text = f"{', '.join(wide)}: stated so uncertainly that nothing is told; state it better"
+            unusable = Status.ILL_CONDITIONED, text
         return Estimate.without(basis, *unusable, findings=all_findings, result=result)
     # all noises are judged by one set of innovations; their parts add up to them but for rounding
     more = np.square(np.diag(uncertainty.covariance) / np.diag(by_filter))
@@ -136,7 +147,7 @@ def assemble(
     # of biases that walk no recording tells more
     left = {name: part for name, part in judged.at_prior.items() if KIND_OF[name] not in BIAS_WALK}
     all_findings += at_prior(left, hints)
-    limit = _limit(agreement, recording, settings)
+    limit = _limit(agreement, passed, settings)
     status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
     # numbers that must not be used need no more findings
     if status is not Status.INCONSISTENT:
@@ -184,17 +195,23 @@ def _on_rig(kinds: Sequence[str]) -> str:
 
 
 def verdict(
-    filtered: FilterResult, recording: Recording, settings: SelfcalSettings, findings: Sequence[Finding] = ()
+    filtered: FilterResult,
+    recording: Recording,
+    settings: SelfcalSettings,
+    findings: Sequence[Finding] = (),
+    passed: PlatformPass | None = None,
 ) -> tuple[Status, str]:
-    """Status and sentence of an estimator, for comparisons."""
+    """Status and sentence of an estimator, for comparisons; ``passed`` the pass of the one that counts."""
     slope, p = product_slope(filtered.coefficients), len(filtered.coefficients)
     prior = settings.priors[[ALL.index(name) for name in filtered.names]]
     bounds = PathBounds(filtered.names, slope @ filtered.covariance @ slope.T, prior, np.empty((0, p)))
     if (unusable := useless(filtered, bounds, bounds.covariance)) is not None:
         return unusable
+    if passed is None:
+        passed = pass_of(recording, problem(settings), filtered)
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
-    limit = _limit(agreement, recording, settings)
+    limit = _limit(agreement, passed, settings)
     return _verdict(observability(bounds, {}), agreement, limit, cause, _hardly_turned(recording, settings))
 
 
@@ -204,15 +221,21 @@ def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
     return explaining[0].message if explaining else "check noise, commands, signs and units"
 
 
-def _limit(agreement: Nis, recording: Recording, settings: SelfcalSettings) -> float:
+def _limit(agreement: Nis, passed: PlatformPass | None, settings: SelfcalSettings) -> float:
     """Largest mean NIS of a recording that does not contradict the model: that of an exact study, plus the part that
     disappears with systematic inputs moved, within their uncertainties, to where the recording fits best."""
-    errors, of = stated_errors(settings), problem(settings)
-    if errors is None:
+    moved = [
+        problem(given.changed(given.u))
+        for given in (systematic_inputs(settings) if passed else ())
+        if given.u
+    ]
+    if passed is None or not moved:
         return agreement.limit(LIMITS.nis_sigmas)
-    moved = likely(recording, of, errors)
-    before, after = (float(np.nansum(judging((recording, each)).nis)) for each in (of, moved))
-    return agreement.limit(LIMITS.nis_sigmas) + max(0.0, before - after) / agreement.rows
+    stated = passed.with_stated(moved)
+    if not np.abs(stated.change[-len(moved) :]).max() <= sigmas(LIMITS.risk, len(moved)):
+        return agreement.limit(LIMITS.nis_sigmas)  # further than chance takes them
+    gained = passed.sums.chi2 - stated.chi2
+    return agreement.limit(LIMITS.nis_sigmas) + max(0.0, gained) / agreement.rows
 
 
 def _verdict(

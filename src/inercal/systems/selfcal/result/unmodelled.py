@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,17 +17,14 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.effects import joint_second_moment
+from inercal.foundation.inference.scores import ErrorColumns
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.records.places import counted_names
 from inercal.foundation.results.budget import TypeB
-from inercal.systems.selfcal.before.considered import both
-from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, regular
-from inercal.systems.selfcal.filters.averaged import averaged
-from inercal.systems.selfcal.filters.filter_result import FilterResult
-from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.diagnosis.passed import PlatformPass
+from inercal.systems.selfcal.filters.whitened import BLOCKS
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import product_slope
-from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.states import (
     ALL,
     BIAS_WALK,
@@ -38,14 +34,13 @@ from inercal.systems.selfcal.platform.states import (
     TEMPERATURE,
     UNIT_OF,
     WALK,
-    WAVE,
 )
 from inercal.systems.selfcal.settings import SelfcalSettings
 
 SOURCE = "errors of the rig that are not fitted"
 
-_WANDERS = {"gyro_walk": "kg0_T1", "accelerometer_walk": "ka0_T1"}
-"""Kind of a walk -> that of which the columns, with a course of time in the place of temperature, are its own."""
+_BIAS = {"gyro_walk": "kg0", "accelerometer_walk": "ka0"}
+"""Kind of a walk -> the biases that walk."""
 
 
 class Unmodelled(NamedTuple):
@@ -58,14 +53,13 @@ class Unmodelled(NamedTuple):
 
 
 class _Effects(NamedTuple):
-    """Errors: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual`` (q,) sizes [SI]; per usual
-    size the change of the m normalised ``innovations`` (m, q) that count and of the coefficients, ``shift`` (p, q)."""
+    """Errors: ``kinds`` (q,) and ``names`` (q,) of the states that they would be, ``usual`` (q,) sizes [SI], and their
+    ``columns`` in a pass."""
 
     kinds: tuple[str, ...]
     names: tuple[str, ...]
     usual: Array
-    innovations: Array
-    shift: Array
+    columns: ErrorColumns
 
 
 class Evidence(NamedTuple):
@@ -81,38 +75,31 @@ class Evidence(NamedTuple):
     shift: Array
 
 
-def unmodelled(
-    recording: Recording, settings: SelfcalSettings, result: FilterResult, u: Array
-) -> Unmodelled | None:
-    """Errors that are not fitted by the ``result`` of a filter, whose coefficients have ``u`` (p,) without them; None
-    where the states are not those of a rig, or where no error is left."""
-    found = evidence(recording, settings, result)
+def unmodelled(passed: PlatformPass, settings: SelfcalSettings, u: Array) -> Unmodelled | None:
+    """Errors that a calibration does not fit, whose coefficients have ``u`` (p,) without them; None where the states
+    are not those of a rig, or where no error is left."""
+    found, result = evidence(passed, settings), passed.result
     if found is None:
         return None
     return counted(found, product_slope(result.coefficients), result.names, u)
 
 
-def evidence(recording: Recording, settings: SelfcalSettings, result: FilterResult) -> Evidence | None:
-    """Evidence that a recording has of errors which the ``result`` of a filter leaves out; None as in `unmodelled`."""
+def evidence(passed: PlatformPass, settings: SelfcalSettings) -> Evidence | None:
+    """Evidence that a recording has of errors which a calibration leaves out; None as in `unmodelled`."""
     if not {*RIG} <= {*settings.kinds}:
         return None
-    case = averaged(recording, problem(settings), result)
-    now = filtered(case)
-    if not now.converged:
-        return None
-    parts = [
-        each for each in (_constant(case, now, settings), *_wandering(case, now, settings)) if each.names
-    ]
+    parts = [part for part in (_constant(passed, settings), _wandering(passed, settings)) if part.names]
     if not parts:
         return None
-    z, columns = regular(case[0], now), np.concatenate([each.innovations for each in parts], axis=1)
+    sums, usual = passed.sums, np.concatenate([part.usual for part in parts])
+    information = np.block([[sums.information(a.columns, b.columns) for b in parts] for a in parts])
     return Evidence(
-        tuple(kind for each in parts for kind in each.kinds),
-        tuple(name for each in parts for name in each.names),
-        np.concatenate([each.usual for each in parts]),
-        columns.T @ z[np.isfinite(z)],
-        columns.T @ columns,
-        np.concatenate([each.shift for each in parts], axis=1),
+        tuple(kind for part in parts for kind in part.kinds),
+        tuple(name for part in parts for name in part.names),
+        usual,
+        np.concatenate([sums.score(part.columns) for part in parts]) * usual,
+        information * np.outer(usual, usual),
+        np.hstack([passed.reach(part.columns) for part in parts]) * usual,
     )
 
 
@@ -166,48 +153,34 @@ def counted(found: Evidence, slope: Array, names: Sequence[str], u: Array) -> Un
     return Unmodelled((*kinds, *walks), source, _told(told, these) if these else None)
 
 
-def _constant(case: Case, now: FilterResult, settings: SelfcalSettings) -> _Effects:
+def _constant(passed: PlatformPass, settings: SelfcalSettings) -> _Effects:
     """Errors that do not change with time."""
-    recording, of = case
-    known = {*of.names, *settings.model.left_out, *settings.model.stated}
-    warm = recording.warm is not None and np.ptp(recording.warm) > 0.0
-    named = ALL[18 : WAVE + 2 * len(of.states.harmonics)]
-    names = [name for name in named if name not in known and (warm or KIND_OF[name] not in TEMPERATURE)]
+    known = {*settings.model.left_out, *settings.model.stated}
+    names = tuple(name for name in passed.errors if name not in known)
     usual = settings.priors[[ALL.index(name) for name in names]]
-    return _of_names(case, now, names, [KIND_OF[name] for name in names], usual)
+    return _Effects(tuple(KIND_OF[name] for name in names), names, usual, passed.of_names(names))
 
 
-def _wandering(case: Case, now: FilterResult, settings: SelfcalSettings) -> list[_Effects]:
+def _wandering(passed: PlatformPass, settings: SelfcalSettings) -> _Effects:
     """Biases that wander about their means: of the walks that are stated, exponentially correlated (A. Gelb, Applied
     Optimal Estimation, 1974, section 3.8), the mean over this recording and cosines of time. None where these are
     states, or where temperature is, by which biases change then."""
-    recording, of = case
-    walks = [kind for kind in BIAS_WALK if f"{_WANDERS[kind][:3]}_walk_x" not in of.names]
-    if not walks or any(ALL.index(name) < WALK and KIND_OF[name] in TEMPERATURE for name in of.names):
-        return []
-    names = [name for kind in walks for name in STATES[_WANDERS[kind]].parameters]
+    of, recording = passed.problem, passed.recording
+    walks = [kind for kind in BIAS_WALK if f"{_BIAS[kind]}_walk_x" not in of.names]
+    if any(ALL.index(name) < WALK and KIND_OF[name] in TEMPERATURE for name in of.names):
+        walks = []
+    names = [name for kind in walks for name in STATES[_BIAS[kind]].parameters]
     kinds = [kind for kind in walks for _ in range(3)]
     sigma = settings.priors[[ALL.index(name) for kind in walks for name in STATES[kind].parameters]]
-    lasts = float(recording.t[-1] - recording.t[0])
-    through, held = (recording.t - recording.t[0]) / lasts, lasts / LIMITS.walk_time
-    waves = []
-    for j in range(LIMITS.wandering + 1):
-        course = replace(recording, warm=np.cos(j * math.pi * through)), of
-        # spectrum of the process at half periods over the recording; that of a mean is half of it
-        part = math.sqrt(min((4.0 if j else 2.0) / (held + (j * math.pi) ** 2 / held), 1.0))
-        waves.append(_of_names(course, now, names, kinds, part * sigma))
-    return waves
-
-
-def _of_names(
-    case: Case, now: FilterResult, names: Sequence[str], kinds: Sequence[str], usual: Array
-) -> _Effects:
-    """Errors of some names, of usual sizes."""
-    recording, of = case
-    assert now.history is not None
-    innovations, shift = both(recording, of, now.history.attitude, now.coefficients, names, now.restarts)
-    there = np.isfinite(regular(recording, now))
-    return _Effects(tuple(kinds), tuple(names), usual, innovations[there] * usual, shift * usual)
+    held = float(recording.t[-1] - recording.t[0]) / LIMITS.walk_time
+    waves = np.arange(LIMITS.wandering + 1)
+    # spectrum of the process at half periods over the recording; that of a mean is half of it
+    parts = np.where(waves > 0, 4.0, 2.0) / (held + (waves * math.pi) ** 2 / held)
+    through = (np.arange(BLOCKS) + 0.5) / BLOCKS
+    at = np.array([of.names.index(name) for name in names], dtype=np.int64)
+    columns = ErrorColumns(at, np.cos(math.pi * np.multiply.outer(through, waves)))
+    usual = np.multiply.outer(np.sqrt(np.minimum(parts, 1.0)), sigma).ravel()
+    return _Effects(tuple(kinds) * len(waves), tuple(names) * len(waves), usual, columns)
 
 
 def _item(kind: str, found: Evidence, own: Array, left: Array) -> dict[str, str | float]:

@@ -63,9 +63,6 @@ _NINETEEN_START = (0.0, -_QUARTER, 0.0)
 _TOLD = 3
 """Coefficients that the table names beside a turn."""
 
-_NEAR = 20.0
-"""Angle [deg] up to which an axis is level or vertical in words."""
-
 
 @dataclass(frozen=True, eq=False)
 class ComparedPlan:
@@ -292,7 +289,8 @@ def _turns(plan: TurnPlan, along: PlanBounds) -> Table:
     C = start_attitude(plan)
     for k, ((axis, angle), told) in enumerate(zip(plan.turns, _told(along), strict=True), start=1):
         slope = math.degrees(math.asin(min(abs(C[2, axis]), 1.0)))
-        lies = "level" if slope < _NEAR else "vertical" if slope > 90.0 - _NEAR else "slanting"
+        near = LIMITS.level_axis
+        lies = "level" if slope < near else "vertical" if slope > 90.0 - near else "slanting"
         C = C @ elementary(AXES[axis], angle)
         words = ", ".join(f"{name} /{factor:.3g}" for name, factor in told[:_TOLD]) or "nothing new"
         rows.append((str(k), AXES[axis], f"{math.degrees(angle):g} deg", lies, words))

@@ -54,10 +54,13 @@ def _by_compass(settings: StrapdownSettings) -> bool:
 
 def start_u(settings: StrapdownSettings) -> Array:
     """Standard deviations (3,) [rad] of the attitude at the start about east, north, up; level is found by
-    accelerometers whose biases are not known yet."""
-    start = settings.start
+    accelerometers, north by gyros whose biases are not known yet."""
     tilt = math.hypot(LIMITS.start_tilt, settings.prior.bias / STANDARD_GRAVITY)
-    return np.array([tilt, tilt, LIMITS.start_heading if _by_compass(settings) else start.u])
+    heading = settings.start.u
+    if _by_compass(settings):  # a bias to the east turns north by its part of the level earth rate
+        level = EARTH_RATE * math.cos(settings.latitude)
+        heading = math.hypot(LIMITS.start_heading, min(settings.prior.gyro_bias / level, 0.5 * math.pi))
+    return np.array([tilt, tilt, heading])
 
 
 def first_coefficients(samples: Samples, nodes: Nodes) -> Array:

@@ -8,14 +8,18 @@ size leaves open.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.systems.strapdown.fit.batch import Fit, interval_covariance, variances_of
+from inercal.systems.strapdown.fit.restricted import opened
+from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import GRAVITY, LATITUDE
 from inercal.systems.strapdown.model.samples import Samples
-from inercal.systems.strapdown.noise.restricted import opened
 from inercal.systems.strapdown.settings import StrapdownSettings
 
 
@@ -58,5 +62,15 @@ def sources(fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Arra
         for k in np.flatnonzero(fit.free == place).tolist():
             u = float(fit.prior[k])
             parts.append(TypeB(name, u, unit, of_prior[:, k] / u))
+    if 1.0 < (times := excess(fit)) <= INFERENCE.gross:
+        more = (times**2 - 1.0) * (slope @ fit.covariance @ slope.T)
+        parts.append(TypeA("residuals beyond the stated noise", times, "1", more, dof))
     begun = np.einsum("qa,a,ra->qr", nodes[:, 0, :m], chain.start, nodes[:, 0, :m])
     return [*parts, TypeA("attitude at the start", float(chain.start[2] ** -0.5), "rad", begun, dof)]
+
+
+def excess(fit: Fit) -> float:
+    """Residuals over the stated noise (rms), where they are larger by more than chance; else 1."""
+    from scipy.special import chdtri
+
+    return math.sqrt(fit.chi2 / fit.dof) if fit.chi2 > float(chdtri(fit.dof, LIMITS.risk)) else 1.0

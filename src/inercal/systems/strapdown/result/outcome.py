@@ -13,6 +13,8 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.geometry.rotations import conjugate, log, multiply
 from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN, Learned, learned
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
+from inercal.foundation.inference.plausible import beyond_prior
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted, counted_names
@@ -23,6 +25,8 @@ from inercal.foundation.results.remarks import at_prior_together, exact_gravity,
 from inercal.foundation.results.result import Estimate
 from inercal.systems.strapdown.fit.batch import Fit
 from inercal.systems.strapdown.fit.error_state import Filtered
+from inercal.systems.strapdown.fit.restricted import residuals
+from inercal.systems.strapdown.fit.unmodelled import TestedEffect, considered, posed, tests
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.coefficients import (
     ALWAYS,
@@ -35,9 +39,8 @@ from inercal.systems.strapdown.model.coefficients import (
     stated,
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
-from inercal.systems.strapdown.noise.restricted import residuals
-from inercal.systems.strapdown.noise.unmodelled import TestedEffect, considered, posed, tests
-from inercal.systems.strapdown.result.budget import sources
+from inercal.systems.strapdown.result.budget import excess, sources
+from inercal.systems.strapdown.result.judged import judged_unit
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings
 
 COMMAND = "calibrate strapdown"
@@ -110,10 +113,19 @@ def assemble(
     findings = [*record.findings, *at_prior_together(at_prior)]
     findings += exact_gravity(settings.site, "its relative error goes into all K1")
     findings += _too_quiet(fit)
-    findings += _unmodelled(tested, found, J, fitted_u)
+    misfit = excess(fit)
+    findings += _left_out(tested, found, J, fitted_u)
+    if fit.converged and fit.chi2 > INFERENCE.noiseless**2 * fit.dof:
+        findings += judged_unit(batch, samples, settings, found, J, fitted_u)
+    if 1.0 < misfit <= INFERENCE.gross:
+        text = f"Residuals are {misfit:.2g} times what the stated noise explains, and u allows for it."
+        findings.append(
+            Finding("excess_scatter", text, harm=(), action="State the noise as it is under [noise].")
+        )
     findings += [each for ramp in ramps if (each := _shown(ramp, found, J, fitted_u)).harm]
     findings += [drifts.finding] if drifts and drifts.finding else []
-    findings += _beyond_prior(found, values - in_words(np.zeros(len(fit.free))), prior_u, uncertainty.u)
+    off = values - in_words(np.zeros(len(fit.free)))
+    findings += beyond_prior(found, off, by_fit, misfit * prior_u, INFERENCE.value_risk)
     findings += _turn_noise(settings, left)
     at_rest, over_turns = residuals(fit)
     statistics = {
@@ -317,25 +329,27 @@ def _turn_noise(settings: StrapdownSettings, left: Mapping[str, float]) -> list[
     return [Finding("turn_noise", text)]
 
 
-def _unmodelled(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
-    """The effect outside the model that explains most, where that is more than chance; else terms that usually are
-    estimated and were left out, where they may shift a value by more than its u."""
-    if not tested:
+def _left_out(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, u: Array) -> list[Finding]:
+    """Terms that usually are estimated and were left out, where they may shift a value by more than its u; none where
+    the recording shows an effect outside the model."""
+    if not tested or tested[0].significant:
         return []
-    if not tested[0].significant:
-        return [
-            Finding("unmodelled", f"terms leaves out {each.candidate.words}, which may be as large as their prior",
-                    action=f"{each.candidate.advice}, or state a smaller prior.{each.candidate.name}", harm=harm)
-            for each in tested
-            if each.candidate.name in USUAL
-            and (harm := _beyond(found, np.linalg.norm(slope @ each.reach, axis=1), u))
-        ]  # fmt: skip
-    return [_shown(tested[0], found, slope, u)]
+    return [
+        Finding(
+            "unmodelled",
+            f"terms leaves out {effect.candidate.words}, which may be as large as their prior.",
+            action=f"{effect.candidate.advice}, or state a smaller prior.{effect.candidate.name}",
+            harm=harm,
+        )
+        for effect in tested
+        if effect.candidate.name in USUAL
+        and (harm := _beyond(found, np.linalg.norm(slope @ effect.reach, axis=1), u))
+    ]
 
 
 def _shown(best: TestedEffect, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
-    """The finding of an effect that the recording shows; it harms the values that it would shift by more than u."""
-    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), u)
+    """The finding of an effect that the recording shows; it harms the values that it would shift by more than 2 u."""
+    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), INFERENCE.harm * u)
     text = (
         f"the recording shows {candidate.words} (chi-square falls by {best.drop:.4g} for "
         f"{counted(len(candidate.prior), 'parameter')})"
@@ -348,23 +362,10 @@ def _beyond(found: tuple[str, ...], shift: Array, u: Array) -> tuple[str, ...]:
     return tuple(name for name, by, each in zip(found, shift.tolist(), u.tolist(), strict=True) if by > each)
 
 
-def _beyond_prior(found: tuple[str, ...], off: Array, prior_u: Array, u: Array) -> list[Finding]:
-    """``prior_suspect`` where a value is so far ``off`` those of a perfect unit that its prior cannot be."""
-    far = np.abs(off) > LIMITS.far_from_prior * np.hypot(prior_u, u)
-    names_far = [name for name, each in zip(found, far.tolist(), strict=True) if each]
-    if not names_far:
-        return []
-    text = f"{counted_names(names_far, 6)} far outside the stated prior"
-    return [Finding("prior_suspect", text, action="widen it, or check units and signs")]
-
-
 def _verdict(
     fit: Fit, left: Mapping[str, float], judged: Learned, statistics: Mapping[str, float], estimator: str
 ) -> tuple[Status, str]:
     """Status and sentence."""
-    from scipy.special import chdtri
-
-    limit = float(chdtri(fit.dof, LIMITS.risk))
     if not fit.converged and estimator == "error-state":
         return Status.NOT_CONVERGED, (
             f'after {fit.passes} passes of the filter the coefficients still move: take the batch (filter = "batch"), '
@@ -375,10 +376,10 @@ def _verdict(
             f"after {fit.passes} passes the coefficients still move: check units, signs and the order of axes, and "
             "that the prior allows for what the unit is"
         )
-    if fit.chi2 > limit:
+    if (misfit := excess(fit)) > INFERENCE.gross:
         return Status.INCONSISTENT, (
-            f"the recording contradicts model or noise: chi-square {fit.chi2:.4g}, expected {fit.dof:.0f} and at most "
-            f"{limit:.4g}; residuals are {statistics['turn_residual_rms']:.2g} times the noise over turns and "
+            f"the recording contradicts model or noise by {misfit:.2g} times: residuals are "
+            f"{statistics['turn_residual_rms']:.2g} times the noise over turns and "
             f"{statistics['rest_residual_rms']:.2g} times within rests"
         )
     unseen = [name for name in left if group_of(name) in ALWAYS and left[name] > UNSEEN]

@@ -19,11 +19,11 @@ from inercal.foundation.records.places import counted
 from inercal.foundation.sensitivities.averages import Averages, Flag
 from inercal.foundation.sensitivities.indices import Indices
 from inercal.systems.turntable.figures.table import factor_rows, rig, rig_facts
-from inercal.systems.turntable.sensitivity.analysis import result as analysis_result
+from inercal.systems.turntable.sensitivity import result as analysis_result
 
 if TYPE_CHECKING:
     from inercal.foundation.results.result import Estimate
-    from inercal.systems.turntable.sensitivity.analysis import Analysed
+    from inercal.systems.turntable.sensitivity import Analysed
     from inercal.systems.turntable.settings import TurntableSettings
 
 

@@ -11,14 +11,12 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.designs.foresight import Foresight, Lever
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import channels_of
 from inercal.systems.turntable.positions.fit import choose_terms
 from inercal.systems.turntable.positions.outcome import unit_of_term
 from inercal.systems.turntable.positions.tolerance_design import DRIFT, trial
 from inercal.systems.turntable.settings import TurntableSettings
-
-_MOST = 200
-"""Positions of a test that is looked at."""
 
 
 def foresight(settings: TurntableSettings) -> Foresight:
@@ -74,10 +72,10 @@ def _angles(settings: TurntableSettings) -> Array:
     """Angles of the positions of a study; raises `StudyError` for too many."""
     if settings.rate_test is not None or settings.step_test is not None:
         raise StudyError("rate_test", "found a test of rates or steps, expected one of positions")
-    if len(settings.plan) > _MOST:
+    if len(settings.plan) > (most := LIMITS.foreseen_positions):
         raise StudyError(
             "positions",
-            f"found the {settings.plan.name} with {len(settings.plan)} positions, expected those of a test, {_MOST} at "
+            f"found the {settings.plan.name} with {len(settings.plan)} positions, expected those of a test, {most} at "
             'most, such as plan = "24-position"',
         )
     return settings.plan.angles

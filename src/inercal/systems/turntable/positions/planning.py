@@ -21,14 +21,13 @@ from inercal.foundation.designs.criteria import (
     i_criterion,
     insensitive,
     judge,
-    within,
 )
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.rigs.outputs import table_outputs
-from inercal.foundation.rigs.plans import Plan, named
+from inercal.foundation.rigs.plans import Plan, named, within
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model

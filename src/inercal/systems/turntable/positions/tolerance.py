@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.instruments.polynomial import ChannelModel
+from inercal.foundation.instruments.by_angle import ChannelModel
 from inercal.foundation.rigs.chain import Chain, Scope
 from inercal.systems.turntable.model import TableModel
 from inercal.systems.turntable.regression import Regression, solve

@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.criteria import a_criterion, within
+from inercal.foundation.designs.criteria import a_criterion
 from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.tolerances import Price, Ratios, cheapest, tightest, total
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.findings import Finding
-from inercal.foundation.rigs.plans import Plan, named
+from inercal.foundation.rigs.plans import Plan, named, within
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, channels_of
 from inercal.systems.turntable.positions.fit import choose_terms

@@ -27,13 +27,14 @@ from inercal.systems.imu.limits import LIMITS
 class Misfit:
     """A fault that is in the data, as the ``finding`` says it.
 
-    ``shift`` (p,) of the coefficients if it is fitted with them; ``part`` the rms of what it does to the outputs over
-    the variation of these.
+    ``shift`` (p,) of the coefficients if it is fitted with them; ``part`` the rms of what it does to the outputs, the
+    ``patterns`` (n,) of each sensor, over the variation of these.
     """
 
     finding: Finding
     shift: Array
     part: float
+    patterns: tuple[Array, ...]
 
 
 def misfits(
@@ -64,7 +65,7 @@ def misfits(
         part, change = _part(fit, patterns), judge.change(patterns)
         if part >= LIMITS.faint_share and _explains(fit, without, change):
             shift = rows @ change - _biases(fit, names, patterns)
-            named.append(Misfit(each.finding, shift, part))
+            named.append(Misfit(each.finding, shift, part, tuple(patterns)))
     return named
 
 

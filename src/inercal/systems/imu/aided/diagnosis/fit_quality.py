@@ -31,9 +31,7 @@ class Whitening:
         """(N,) residuals."""
         unknowns = self.fit.unknowns
         prior = (unknowns.mean - self.fit.x) / unknowns.sd
-        outputs = [
-            _whitened(sensor, sensor.equation.residual[:, None]).rows[1:, 0] for sensor in case.sensors
-        ]
+        outputs = [whitened(sensor, sensor.equation.residual[:, None]).rows[1:, 0] for sensor in case.sensors]
         return self._left(np.concatenate([prior, *outputs]))
 
     def misfit(self, case: AidedFit) -> float:
@@ -56,8 +54,8 @@ class Whitening:
 
     def _rows(self, patterns: Sequence[Array]) -> Array:
         """(N, q) whitened patterns; no prior sees them."""
-        whitened = [_whitened(*each).rows[1:] for each in zip(self.fit.sensors, patterns, strict=True)]
-        return np.vstack([np.zeros((len(self.fit.x), patterns[0].shape[1])), *whitened])
+        white = [whitened(*each).rows[1:] for each in zip(self.fit.sensors, patterns, strict=True)]
+        return np.vstack([np.zeros((len(self.fit.x), patterns[0].shape[1])), *white])
 
     def _left(self, rows: Array) -> Array:
         """Residuals of rows (N, ...) after the unknowns."""
@@ -69,15 +67,15 @@ def whitening(fit: AidedFit) -> Whitening:
     P = len(fit.x)
     rows = [np.eye(P)]
     for sensor in fit.sensors:
-        index, whitened = sensor.equation.index, sensor.whitened.rows[1:, :-1]
-        wide = np.zeros((len(whitened), P))
-        wide[:, index] = whitened * fit.unknowns.sd[index]
+        index, white = sensor.equation.index, sensor.whitened.rows[1:, :-1]
+        wide = np.zeros((len(white), P))
+        wide[:, index] = white * fit.unknowns.sd[index]
         rows.append(wide)
     Q, R = np.linalg.qr(np.vstack(rows))
     return Whitening(fit, Q, R)
 
 
-def _whitened(sensor: Sensor, columns: Array) -> WhitenedColumns:
+def whitened(sensor: Sensor, columns: Array) -> WhitenedColumns:
     """Columns (n, c) of the output of a sensor, whitened by its noise."""
     t, length, resting = sensor.side.blocks.middle, sensor.side.blocks.length, sensor.side.blocks.resting
     return whiten(columns, t, sensor.noise.white(length, resting), sensor.noise.wander(t, length, resting))
@@ -85,7 +83,7 @@ def _whitened(sensor: Sensor, columns: Array) -> WhitenedColumns:
 
 def mean_bias(sensor: Sensor, pattern: Array) -> float:
     """Mean of the bias over the test that a pattern (n,) in the output of a sensor makes."""
-    return float(_whitened(sensor, pattern[:, None]).mean[0])
+    return float(whitened(sensor, pattern[:, None]).mean[0])
 
 
 def without_patterns(fit: AidedFit, patterns: Sequence[Array]) -> AidedFit:

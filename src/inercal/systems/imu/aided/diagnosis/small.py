@@ -1,8 +1,8 @@
 """Constant errors of a test on a table: hypotheses, each with the pattern that it would leave in the outputs.
 
 A bias that wanders, and noise that is larger in turns, can imitate nearly any of them, so that residuals alone do not
-tell. Patterns do: an angle recorded half a percent too large leaves errors that go with the angle, a gyro at the end
-of its range errors that go with the cube of the rate.
+tell. Patterns do: an angle recorded half a percent too large leaves errors that go with the angle. What needs no name,
+such as an angle that errs once a turn or an output that bends, is left to the judge.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from functools import partial
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.geometry.earth import EARTH_RATE
 from inercal.foundation.geometry.rotations import Axis, elementary
 from inercal.foundation.inference.hypotheses import Fitted, Hypothesis
 from inercal.foundation.rigs.chain import Chain, Fixed, Joint
 from inercal.systems.imu.aided.diagnosis.fit_quality import Whitening, without_patterns
 from inercal.systems.imu.aided.diagnosis.gross import expected
-from inercal.systems.imu.aided.fit import AidedFit, Sensor
+from inercal.systems.imu.aided.fit import AidedFit
 from inercal.systems.imu.aided.table import TableMotion
 from inercal.systems.imu.limits import LIMITS
 
@@ -66,25 +65,22 @@ Entry = tuple[str, str, Patterns, Callable[[Array], str]]
 
 
 def _entries(fit: AidedFit, motion: TableMotion, gravity: float) -> Iterator[Entry]:
-    """Faults of the angles, the clock, the earth rate and the outputs."""
-    outputs = {triad: _at_fit(fit, motion, triad) for triad in fit.identified}
+    """Faults of the angles, the clock, and the filters of the outputs."""
+    outputs = {triad: at_fit(fit, motion, triad) for triad in fit.identified}
     yield from _of_angles(fit, motion, gravity, outputs)
     yield _of_clock(fit, motion, gravity, outputs)
-    if "gyro" in fit.identified:
-        yield from _of_gyro(fit, gravity)
     for triad in fit.identified:
         yield _memory(fit, motion, gravity, triad)
-        yield from _nonlinear(fit, gravity, triad)
 
 
-def _at_fit(fit: AidedFit, motion: TableMotion, triad: str) -> Array:
+def at_fit(fit: AidedFit, motion: TableMotion, triad: str) -> Array:
     """Force over gravity, or rate [rad/s], (n, 3) by a motion whose angles come as late as the fit says."""
     sensor = next(each for each in fit.sensors if each.side.sensor == triad)
     late = fit.references[triad].shift
     return expected(sensor.side.blocks, replace(motion, t=motion.t - late))
 
 
-def _seen(fit: AidedFit, changes: dict[str, Array], gravity: float) -> Patterns:
+def seen(fit: AidedFit, changes: dict[str, Array], gravity: float) -> Patterns:
     """Outputs by changes (n, 3, q) of the force over gravity, or of the rate, by triad."""
     patterns: Patterns = {}
     for k, sensor in enumerate(fit.sensors):
@@ -103,26 +99,20 @@ def gain(fit: AidedFit, triad: str) -> Array:
 def _of_angles(
     fit: AidedFit, motion: TableMotion, gravity: float, outputs: dict[str, Array]
 ) -> Iterator[Entry]:
-    """Angles of a wrong scale, and with errors that come back in each turn; axes that are not where they should be."""
+    """Angles of a wrong zero or scale; axes that are not where they should be."""
     for k, joint in enumerate(motion.chain.joints):
         angle = motion.angles[:, k]
         patterns = []
-        turns = [wave(order * angle) for order in (1, 2) for wave in (np.sin, np.cos)]
-        for wrong in (np.ones_like(angle), angle, *turns):
+        for wrong in (np.ones_like(angle), angle):
             angles = motion.angles.copy()
             angles[:, k] += STEP * wrong
             moved = replace(motion, angles=angles)
-            patterns.append({triad: (_at_fit(fit, moved, triad) - x) / STEP for triad, x in outputs.items()})
-        for name, kind, words in (
-            ("zero", (0,), _zero),
-            ("scale", (0, 1), _scale),
-            ("round", (2, 3), partial(_round, 1)),
-            ("twice round", (4, 5), partial(_round, 2)),
-        ):
+            patterns.append({triad: (at_fit(fit, moved, triad) - x) / STEP for triad, x in outputs.items()})
+        for name, kind, words in (("zero", (0,), _zero), ("scale", (0, 1), _scale)):
             changes = {
                 triad: np.stack([patterns[each][triad] for each in kind], axis=-1) for triad in outputs
             }
-            yield f"{name} of {joint}", "contradiction", _seen(fit, changes, gravity), partial(words, joint)
+            yield f"{name} of {joint}", "contradiction", seen(fit, changes, gravity), partial(words, joint)
     elements = motion.chain.elements
     before = ""
     for k, element in enumerate(elements):
@@ -134,9 +124,9 @@ def _of_angles(
                 turned = Chain((*elements[:k], Fixed(elementary(axis, STEP)), *elements[k:]))
                 moved = replace(motion, chain=turned)
                 for triad, x in outputs.items():
-                    changes[triad][:, :, j] = (_at_fit(fit, moved, triad) - x) / STEP
+                    changes[triad][:, :, j] = (at_fit(fit, moved, triad) - x) / STEP
             words = partial(_tilted, before, element.name)
-            yield f"tilt of {element.name}", "contradiction", _seen(fit, changes, gravity), words
+            yield f"tilt of {element.name}", "contradiction", seen(fit, changes, gravity), words
             before = element.name
 
 
@@ -164,25 +154,15 @@ def _scale(joint: str, a: Array) -> str:
     )
 
 
-def _round(order: int, joint: str, a: Array) -> str:
-    times, cause = (
-        ("once", "the levelling, or an encoder off its centre") if order == 1 else ("twice", "the encoder")
-    )
-    return (
-        f"the angles {joint} are wrong by up to {np.degrees(np.hypot(*a)):.2g} deg, in a way that "
-        f"goes with the angle and comes back {times} in a turn: check {cause}"
-    )
-
-
 def _of_clock(fit: AidedFit, motion: TableMotion, gravity: float, outputs: dict[str, Array]) -> Entry:
     """A clock of the angles that runs at another rate."""
     middle, span = float(np.mean(motion.t)), float(np.ptp(motion.t))
     moved = replace(motion, t=middle + (motion.t - middle) * (1.0 + STEP))
-    changes = {triad: ((_at_fit(fit, moved, triad) - x) / STEP)[:, :, None] for triad, x in outputs.items()}
+    changes = {triad: ((at_fit(fit, moved, triad) - x) / STEP)[:, :, None] for triad, x in outputs.items()}
     return (
         "clock",
         "command_shift",
-        _seen(fit, changes, gravity),
+        seen(fit, changes, gravity),
         lambda a: (
             f"the clocks of angles and sensors run apart, by {1e6 * abs(a[0]):.0f} ppm or {1e3 * span * abs(a[0]):.2g} "
             f"ms over the test: multiply the times of the angles by {1.0 + a[0]:.6f}"
@@ -190,87 +170,17 @@ def _of_clock(fit: AidedFit, motion: TableMotion, gravity: float, outputs: dict[
     )
 
 
-def _of_gyro(fit: AidedFit, gravity: float) -> Iterator[Entry]:
-    """Another earth rate than stated, and a gyro that feels the specific force."""
-    C_bn = fit.references["gyro"].C_bn
-    h = fit.x[fit.unknowns.places["earth rate"]]
-
-    def rate(a: Array) -> str:
-        north, west, up = h + EARTH_RATE * a
-        turned = np.degrees(np.arctan2(-west, north))
-        return (
-            f"the gyro sees an earth rate of {np.degrees(north) * 3600:.2g}, {np.degrees(west) * 3600:.2g} and "
-            f"{np.degrees(up) * 3600:.2g} deg/h north, west and up, which contradicts what is stated: check the "
-            f"latitude, and the azimuth of the table (off by {turned:.0f} deg)"
-        )
-
-    yield "earth rate", "contradiction", _seen(fit, {"gyro": EARTH_RATE * C_bn}, gravity), rate
-    if "gain G" in fit.unknowns.places:
-        return
-    up = C_bn[:, :, 2]
-    patterns: Patterns = {}
-    for k, sensor in enumerate(fit.sensors):
-        if sensor.side.sensor == "gyro":
-            patterns[k] = np.zeros((len(up), 9))
-            patterns[k][:, 3 * (k % 3) : 3 * (k % 3) + 3] = up
-    unit = next(each for each in fit.sensors if each.side.sensor == "gyro").side.blocks.triad.unit.symbol
-    yield (
-        "g-sensitivity",
-        "g_sensitivity",
-        patterns,
-        lambda a: (
-            f"the gyro output changes with the specific force by up to {np.max(np.abs(a)):.2g} {unit} per g: set "
-            "imu.g_sensitivity = true to estimate it"
-        ),
-    )
-
-
 def _memory(fit: AidedFit, motion: TableMotion, gravity: float, triad: str) -> Entry:
     """Outputs that go through a slow filter: beside the delay there is a second derivative."""
     step = LIMITS.smoothing_step
-    early, now, late = (_at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-step, 0.0, step))
+    early, now, late = (at_fit(fit, replace(motion, t=motion.t + by), triad) for by in (-step, 0.0, step))
     words = "accelerometers" if triad == "acc" else "gyro"
     return (
         f"smoothing of {triad}",
         "contradiction",
-        _seen(fit, {triad: ((early - 2.0 * now + late) / step**2)[:, :, None]}, gravity),
+        seen(fit, {triad: ((early - 2.0 * now + late) / step**2)[:, :, None]}, gravity),
         lambda a: (
             f"the outputs of the {words} are smoothed over some {1e3 * np.sqrt(2.0 * abs(a[0])):.0f} ms against the "
             "angles: use a faster filter, or start and stop the turns more gently"
         ),
     )
-
-
-def _nonlinear(fit: AidedFit, gravity: float, triad: str) -> Iterator[Entry]:
-    """Outputs that go with the square or the cube of the input."""
-    ref = fit.references[triad]
-    x = gravity * ref.C_bn[:, :, 2] if triad == "acc" else ref.rate
-    for k, sensor in enumerate(fit.sensors):
-        if sensor.side.sensor != triad:
-            continue
-        output = x @ gain(fit, triad)[k % 3]
-        size = float(np.max(np.abs(output)))
-        for power in (2, 3) if size > 0.0 else ():
-            yield _curved(
-                {k: (output / size)[:, None] ** power}, sensor, f"{triad}_{'xyz'[k % 3]}", size, power
-            )
-
-
-def _curved(patterns: Patterns, sensor: Sensor, name: str, size: float, power: int) -> Entry:
-    """An output with a term of a power of its input."""
-    unit = sensor.side.blocks.triad.unit.symbol
-
-    def words(a: Array) -> str:
-        part = float(a[0]) / size
-        if power == 3 and part < -LIMITS.short_share:
-            return (
-                f"{name} falls short at the largest input, by some {100.0 * abs(part):.2g} % at {size:.3g} {unit}: it "
-                "saturates or is not linear; turn slower, or set a wider range"
-            )
-        order = "square" if power == 2 else "cube"
-        term = f"{float(a[0]):.2g} {unit} at {size:.3g} {unit}"
-        cure = "; set imu.k2 = true to estimate it" if code == "unmodelled_k2" else ""
-        return f"{name} is not linear: a term with the {order} of the input, of {term}{cure}"
-
-    code = "unmodelled_k2" if name.startswith("acc") else "contradiction"
-    return f"power {power} of {name}", "saturation" if power == 3 else code, patterns, words

@@ -10,7 +10,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.systems.imu.sections.carried import Move
-from inercal.systems.imu.sections.cutting.cut import TriadSamples, calm_part
+from inercal.systems.imu.sections.cutting.cut import TriadSamples
 from inercal.systems.imu.sections.cutting.log import on_clock
 from inercal.systems.imu.sections.cutting.table import SectionRow
 from inercal.systems.imu.sections.section import Section
@@ -42,9 +42,8 @@ def moves_of(
     sections: Sequence[Section],
     files: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]],
 ) -> tuple[tuple[NamedMove, ...], dict[str, str]]:
-    """Moves by rows of that kind, each from where the gyro is last calm in the rest before it to where it is calm again
-    in the one after it; and those of no use, by name, with the reason. ``files``: accelerometers and gyro of recordings
-    by name."""
+    """Moves by rows of that kind, each from the end of the rest before it to the begin of the one after it; and those
+    of no use, by name, with the reason. ``files``: accelerometers and gyro of recordings by name."""
     place = {section.name: k for k, section in enumerate(sections) if section.acc is not None}
     found: list[NamedMove] = []
     unused: dict[str, str] = {}
@@ -72,10 +71,7 @@ def moves_of(
             continue
         assert first.end is not None
         assert last.begin is not None
-        calm = [calm_part(gyro.between(rest.begin, rest.end)).t for rest in (first, last)]
-        start = calm[0][-1] if len(calm[0]) else first.end
-        stop = calm[1][0] if len(calm[1]) else last.begin
-        there = (gyro.t >= start - 1e-9) & (gyro.t <= stop + 1e-9)
+        there = (gyro.t >= first.end - 1e-9) & (gyro.t <= last.begin + 1e-9)
         t = gyro.t[there]
         force = on_clock(acc, gyro.t)[there]
         moved = Move(place[first.section], place[last.section], t, gyro.values[there], force)
@@ -106,10 +102,10 @@ def swings_of(
 
 
 def with_moves_between(rows: Sequence[SectionRow]) -> list[SectionRow]:
-    """The rows of one log with a move between each two rests that follow each other, unless a turn or a steady rate
-    lies between: never both for one motion, and a whole turn by a gyro in counts leaves its scale ambiguous."""
+    """The rows of one log with a move between each two rests that follow each other, unless a steady rate lies
+    between. A turn whose angle is not known counts as a move until somebody states it."""
     rests = sorted((row for row in rows if row.kind == "rest"), key=lambda row: row.begin or 0.0)
-    turning = [row for row in rows if row.kind in ("turn", "rate")]
+    turning = [row for row in rows if row.kind == "rate"]
     moves = []
     for number, (first, last) in enumerate(pairwise(rests), 1):
         begin, end = first.end or 0.0, last.begin or 0.0

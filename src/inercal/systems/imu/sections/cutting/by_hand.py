@@ -14,7 +14,7 @@ from inercal.foundation.records.column import Triad
 from inercal.foundation.records.record import Record
 from inercal.systems.imu.recording import coarse_steps
 from inercal.systems.imu.sections.cutting.between import as_a_swing, moves_of, swings_of, with_moves_between
-from inercal.systems.imu.sections.cutting.cut import Stretch, TriadSamples, calm_part, cut
+from inercal.systems.imu.sections.cutting.cut import Stretch, TriadSamples, cut
 from inercal.systems.imu.sections.cutting.holds import Holds, holds_of
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.log import never_held, of_holds, on_clock
@@ -41,7 +41,7 @@ def by_hand(name: str, record: Record, settings: ImuSettings) -> Proposal:
     _still_start(acc.t, found, settings.static_start)
     rows = [
         SectionRow(f"pose {k}", name, float(acc.t[one.start]), float(acc.t[one.stop - 1]), why="detected")
-        for k, one in enumerate(found.acc, 1)
+        for k, one in enumerate(found.rests, 1)
     ]
     left, kept = _kept(rows, settings.exclude, acc.t)
     notes: list[Finding] = []
@@ -93,6 +93,7 @@ def by_hand(name: str, record: Record, settings: ImuSettings) -> Proposal:
         swings_of(kept, triads),
         triads,
         _hiding_steps(kept, gyro),
+        numbered=True,
     )
 
 
@@ -100,7 +101,7 @@ def _hiding_steps(rows: Sequence[SectionRow], gyro: TriadSamples | None) -> tupl
     """Steps of the axes of a gyro whose noise in the poses is below half of them, 0 for others."""
     if gyro is None:
         return 0.0, 0.0, 0.0
-    rests = [calm_part(gyro.between(row.begin, row.end)).values for row in rows if row.kind == "rest"]
+    rests = [gyro.between(row.begin, row.end).values for row in rows if row.kind == "rest"]
     deviations = [x.std(axis=0) for x in rests if len(x) > 2]
     if not deviations:
         return 0.0, 0.0, 0.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.plausible import off_scale
 from inercal.foundation.records.places import counted_names
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.section import Section
@@ -20,12 +21,16 @@ from inercal.systems.imu.sections.section import Section
 _LETTERS = "xyz"
 
 
-def contradictions(sections: Sequence[Section], gyro_scale: float | None) -> tuple[Finding, ...]:
+def contradictions(
+    sections: Sequence[Section], gyro_scale: float | None, *, backward: bool = False
+) -> tuple[Finding, ...]:
     """Findings about sections in which something else was read than is said of them.
 
-    ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other.
+    ``gyro_scale`` is that of a sound gyro [output per rad/s]; None: in counts, only compared with each other. One that
+    is known to count ``backward`` has the opposite sign.
     """
-    return (*_of_rests(sections), *_turning_rests(sections), *_of_rotations(sections, gyro_scale))
+    sense = -1.0 if backward else 1.0
+    return (*_of_rests(sections), *_turning_rests(sections), *_of_rotations(sections, gyro_scale, sense))
 
 
 def direction(vector: Array) -> str:
@@ -151,7 +156,7 @@ def _elsewhere(section: Section, force: Array) -> Finding:
     )
 
 
-def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iterator[Finding]:
+def _of_rotations(sections: Sequence[Section], gyro_scale: float | None, sense: float) -> Iterator[Finding]:
     """Contradictions of rates and turns."""
     turning = [
         one
@@ -183,7 +188,7 @@ def _of_rotations(sections: Sequence[Section], gyro_scale: float | None) -> Iter
                 harm=EVERYTHING,
             )
         else:
-            gains.append((one, float(off @ one.axis) / _rate(one)))
+            gains.append((one, sense * float(off @ one.axis) / _rate(one)))
     yield from _of_gains(gains, gyro_scale)
 
 
@@ -200,6 +205,13 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
             harm=EVERYTHING,
         )
         return
+    if gyro_scale is not None and len(gains) > 1:
+        parts = np.array([gain / gyro_scale for _, gain in gains])
+        part = float(np.median(parts))
+        finding = off_scale("The gyro", f"{part:.3g} times what is stated", part, harm=EVERYTHING)
+        if finding.code == "unit_suspect" and np.ptp(parts) < LIMITS.rate_miss * part:
+            yield finding
+            return
     usual = gyro_scale if gyro_scale is not None else float(np.median([abs(gain) for _, gain in gains]))
     for one, gain in gains:
         what, unit, stated = (
@@ -210,7 +222,7 @@ def _of_gains(gains: Sequence[tuple[Section, float]], gyro_scale: float | None) 
                 "sign_suspect",
                 f"{one.name} turns the other way than its {what} says, about {_letter(one)}.",
                 one.where,
-                action=f"Correct the sign of its `{what}` or `axis`.",
+                action=f"Correct the sign of its `{what}` or `axis`, or that of gyro_{_letter(one)} in the map.",
                 harm=EVERYTHING,
             )
         elif abs(gain / usual - 1.0) > LIMITS.rate_miss:

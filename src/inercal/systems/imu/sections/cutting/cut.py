@@ -1,4 +1,7 @@
-"""Sections from stretches of recordings: means, the noise of these, and the motion of a turn from rest to rest."""
+"""Sections from stretches of recordings: means, the noise of these, and the motion of a turn from rest to rest.
+
+A turn whose stretch holds no rests is read as it is stated, the output at rest told by the other sections.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,22 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.noise.dwell_means import equivalent_dof, overlapping_variance, running_sums
+from inercal.foundation.findings import Finding
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.recording import coarse_steps
 from inercal.systems.imu.sections.cutting.holds import still_edges
 from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
+from inercal.systems.imu.sections.cutting.noise_of_means import variances_of_means
 from inercal.systems.imu.sections.cutting.table import SectionRow
-from inercal.systems.imu.sections.section import Section
+from inercal.systems.imu.sections.section import SENSED, Section
+
+ENDS = (", before", ", after")
+"""Ends of the names of the rests before and after a turn, behind the name of the turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +72,18 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Cut:
-    """The sections of stretches; and those of no use, by name, with the reason."""
+    """The sections of stretches; those of no use, by name, with the reason; and what is to be said of either."""
 
     sections: tuple[Section, ...]
     unused: dict[str, str]
+    notes: tuple[Finding, ...] = ()
+
+
+class Flaw(NamedTuple):
+    """The reason why a stretch is of no use: the code of its finding, empty where another one asks, and words."""
+
+    code: str
+    why: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +94,11 @@ class _Read:
     acc: tuple[Array, ...] = ()
     gyro: tuple[Array, ...] = ()
     gyro_samples: int = 0
+    notes: tuple[Finding, ...] = ()
+
+
+_EDGE: Final = 5
+"""Samples at an end of a turn whose mean says whether it is under way there."""
 
 
 def cut(stretches: Sequence[Stretch]) -> Cut:
@@ -89,29 +109,43 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
     The noise of means is told by all stretches of a kind together (that of one is hardly known) by their Allan
     variances, so that what does not average out counts. Coarse outputs add the square of a step over 12.
     """
+    done: dict[int, _Read | Flaw] = {
+        k: _steady(stretch)
+        for k, stretch in enumerate(stretches)
+        if stretch.row.kind in SENSED and stretch.row.kind != "turn"
+    }
+    rests = [
+        one.section.gyro
+        for one in done.values()
+        if isinstance(one, _Read) and one.section.kind == "rest" and one.section.gyro is not None
+    ]
+    bias = np.median(rests, axis=0) if rests else None
+    done |= {k: _turn(stretch, bias) for k, stretch in enumerate(stretches) if stretch.row.kind == "turn"}
     read: list[_Read] = []
     unused: dict[str, str] = {}
-    for stretch in stretches:
-        if stretch.row.kind in ("rest", "rate", "turn"):
-            one = _turn(stretch) if stretch.row.kind == "turn" else _steady(stretch)
-            if isinstance(one, str):
-                unused[stretch.row.section] = one
-            else:
-                read.append(one)
-                if (
-                    stretch.row.kind == "turn"
-                    and stretch.acc is None
-                    and not _rests_in(stretch.row, stretches)
-                ):
-                    read += _ends_of(one)
+    notes: list[Finding] = []
+    for k in sorted(done):
+        one, row = done[k], stretches[k].row
+        if isinstance(one, _Read):
+            read.append(one)
+            notes += one.notes
+            if row.kind == "turn" and one.gyro and stretches[k].acc is None and not _rests_in(row, stretches):
+                read += _ends_of(one)
+            continue
+        unused[row.section] = one.why
+        if one.code:
+            act = "Record it again, or move its ends."
+            notes.append(
+                Finding(one.code, f"{row.section} is not used: {one.why}.", _where(row), (), action=act)
+            )
     sections = [one.section for one in read]
-    for kinds in (("rest", "turn"), ("rate",)):
-        places = [k for k, one in enumerate(read) if one.section.kind in kinds]
+    for steady in (False, True):  # a table at a rate shakes
+        places = [k for k, one in enumerate(read) if (one.section.kind == "rate") == steady]
         for sensor in ("acc", "gyro"):
-            told = [k for k in places if getattr(read[k], sensor)]
-            if not told:
-                continue
+            told = [k for k in places if (read[k].gyro_samples if sensor == "gyro" else read[k].acc)]
             parts = [getattr(read[k], sensor) for k in told]
+            if not any(parts):
+                continue
             counts = [read[k].gyro_samples if sensor == "gyro" else min(map(len, read[k].acc)) for k in told]
             variances = variances_of_means([x for part in parts for x in part], counts)
             for k, variance in zip(told, variances, strict=True):
@@ -120,66 +154,24 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
                     sections[k] = dataclasses.replace(sections[k], acc_var=known)
                 else:
                     sections[k] = dataclasses.replace(sections[k], gyro_var=known)
-    return Cut(tuple(sections), unused)
+    return Cut(tuple(sections), unused, tuple(notes))
 
 
-def variances_of_means(stretches: Sequence[Array], counts: Sequence[int]) -> list[Array]:
-    """Variances (3,) of means over so many samples, by the scatter in ``stretches`` (n, 3) at rest, pooled.
-
-    Means over m samples scatter by the Allan variance v(m); m v(m) is constant where noise is white over m samples and
-    more. It is averaged from the shortest m on from which no longer one contradicts it: of noise that is white from
-    the first sample on all lengths count, of noise that is correlated, or wanders, the long ones alone.
-    """
-    if not any(len(x) > 2 for x in stretches):
-        return [np.full(3, np.nan) for _ in counts]
-    dof = sum(len(x) - 1 for x in stretches)
-    deviation = np.sqrt(sum(((x - x.mean(axis=0)) ** 2).sum(axis=0) for x in stretches) / dof)
-    steps = np.max([coarse_steps(x, deviation) for x in stretches if len(x) > 2], axis=0)
-    densities, weights = _densities(stretches)
-    first = next(k for k in range(len(weights)) if _constant(densities[k:], weights[k:]))
-    first += 0 < first < len(weights) - 1  # the first that is not contradicted still is somewhat low
-    density = np.average(densities[first:], axis=0, weights=weights[first:])
-    return [np.asarray(density / count + steps**2 / 12.0) for count in counts]
-
-
-def _densities(stretches: Sequence[Array]) -> tuple[Array, Array]:
-    """m v(m) (k, 3) at octaves of m up to half the median length, and their degrees of freedom (k,)."""
-    longest = max(int(np.median([len(x) for x in stretches])) // 2, 1)
-    sums = [running_sums(x) for x in stretches]
-    densities, weights = [], []
-    for m in sorted({max(longest // 2**k, 1) for k in range(longest.bit_length())}):
-        told = [x for x in sums if len(x) > 2 * m]
-        pairs = [len(x) - 2 * m for x in told]
-        densities.append(m * np.average([overlapping_variance(x, m) for x in told], axis=0, weights=pairs))
-        weights.append(sum(equivalent_dof(len(x) - 1, m) for x in told))
-    kept = np.maximum.accumulate(np.array(weights)[::-1])[::-1] >= FINDING.noise_dof
-    kept[0] = True
-    return np.array(densities)[kept], np.array(weights)[kept]
-
-
-def _constant(densities: Array, weights: Array) -> bool:
-    """True where no later density (k, 3) contradicts the first, by their degrees of freedom (k,)."""
-    from scipy.special import digamma, polygamma
-
-    live = (densities > 0.0).all(axis=0)
-    if len(densities) == 1 or not live.any():
-        return True
-    bias, scatter = digamma(0.5 * weights) - np.log(0.5 * weights), polygamma(1, 0.5 * weights)
-    logs = np.log(densities[:, live]).mean(axis=1) - bias
-    chance = np.sqrt((scatter[1:] + scatter[0]) / np.count_nonzero(live))
-    return bool(np.all(np.abs(logs[1:] - logs[0]) < FINDING.noise_change * chance))
+def _where(row: SectionRow) -> str:
+    """The file and the times of a row, in words."""
+    begin = "start" if row.begin is None else f"{row.begin:.2f} s"
+    end = "end" if row.end is None else f"{row.end:.2f} s"
+    return row.file if row.begin is None and row.end is None else f"{row.file}, {begin} to {end}"
 
 
 def section_of(row: SectionRow) -> Section:
-    """A section with what its row says, and nothing read yet; of a kind rest, rate or turn."""
-    begin = "start" if row.begin is None else f"{row.begin:.2f} s"
-    end = "end" if row.end is None else f"{row.end:.2f} s"
-    times = "" if row.begin is None and row.end is None else f", {begin} to {end}"
-    assert row.kind in ("rest", "rate", "turn")
+    """A section with what its row says, and nothing read yet; neither of a move nor of a swing."""
+    assert row.kind != "move"
+    assert row.kind != "swing"
     return Section(
         kind=row.kind,
         name=row.section,
-        where=f"{row.file}{times}",
+        where=_where(row),
         why=row.why,
         up=row.up,
         up_u=row.placing,
@@ -199,30 +191,24 @@ def section_of(row: SectionRow) -> Section:
     )
 
 
-def calm_part(gyro: TriadSamples) -> TriadSamples:
-    """The samples of a gyro in a rest that are as calm as in its middle: a motion that begins or ends slowly does no
-    harm to the mean of accelerometers, but to that of a gyro."""
-    n, block = len(gyro.t), max(round(FINDING.still_window / FINDING.blocks_of_window / gyro.step), 2)
-    if n < 4 * FINDING.blocks_of_window * block // 2:
-        return gyro
-    begin, end = still_edges(gyro.values, n // 4, n - n // 4, block, 0.0)
-    part = slice(begin, end)
-    return TriadSamples(gyro.t[part], gyro.values[part], gyro.clipped[part])
-
-
-def _steady(stretch: Stretch) -> _Read | str:
-    """A rest or a steady rate; what is wrong with it, in words. Of a rate the accelerometers are left out."""
+def _steady(stretch: Stretch) -> _Read | Flaw:
+    """A section that is one mean; or what is wrong with it."""
     row = stretch.row
     if row.kind == "rate" and row.rate is None:
-        return "its rate is not stated"
-    acc, gyro = stretch.acc if row.kind == "rest" else None, stretch.gyro
-    if row.kind == "rest" and gyro is not None:
-        gyro = calm_part(gyro)
-    triads = {sensor: one for sensor, one in (("acc", acc), ("gyro", gyro)) if one is not None and len(one.t)}
+        return Flaw("", "its rate is not stated")
+    assert row.kind != "move"
+    assert row.kind != "swing"
+    triads = {
+        sensor: one
+        for sensor, one in (("acc", stretch.acc), ("gyro", stretch.gyro))
+        if sensor in SENSED[row.kind] and one is not None and len(one.t)
+    }
     clipped = [sensor for sensor, one in triads.items() if one.clipped.mean() > LIMITS.clipped_part]
     whole = {sensor: one for sensor, one in triads.items() if sensor not in clipped}
     if not whole:
-        return f"the {clipped[0]} is at the end of its range" if clipped else "no samples lie in it"
+        if clipped:
+            return Flaw("saturation", f"the {clipped[0]} is at the end of its range")
+        return Flaw("poor_section", "no samples lie in it")
     longest = max(whole.values(), key=lambda one: len(one.t))
     means = {sensor: one.values.mean(axis=0) for sensor, one in whole.items()}
     if stretch.force is not None and len(stretch.force.t):
@@ -238,37 +224,45 @@ def _steady(stretch: Stretch) -> _Read | str:
     )
 
 
-def _turn(stretch: Stretch) -> _Read | str:
-    """A turn from rest to rest; what is wrong with it, in words."""
+def _turn(stretch: Stretch, bias: Array | None) -> _Read | Flaw:
+    """A turn from rest to rest; or what is wrong with it. ``bias`` (3,) is the gyro's mean output in rests."""
     row, gyro = stretch.row, stretch.gyro
     if row.angle is None:
-        return "its angle is not stated"
+        return Flaw("", "its angle is not stated")
     if gyro is None:
-        return "a turn without a gyro says nothing"
+        return Flaw("poor_section", "a turn without a gyro says nothing")
     motion = motion_between_rests(gyro.t, gyro.values)
     if isinstance(motion, str):
-        return motion
-    first, last = motion
+        if bias is None or row.begin is None or row.end is None or len(gyro.t) < 4 * _EDGE:
+            return Flaw("poor_section", motion)
+        first, last = 0, len(gyro.t) - 1
+    else:
+        first, last = motion
     part = slice(first, last + 1)
     t, values = gyro.t[part], gyro.values[part]
     if (clipped := int(np.count_nonzero(gyro.clipped[part]))) > 0:
-        return f"{clipped} samples of the gyro in the turn are at the end of its range"
+        return Flaw("saturation", f"{clipped} samples of the gyro in the turn are at the end of its range")
     gaps = np.diff(t)
     if gaps.max() > LIMITS.motion_gap * gyro.step or gaps.min() < 0.0:
-        return "samples are missing within the turn"
-    duration = float(t[-1] - t[0])
+        return Flaw("poor_section", "samples are missing within the turn")
+    cells = lengths_of(t)
+    duration = float(cells.sum())
     before, after = gyro.values[:first], gyro.values[last + 1 :]
-    line = np.linspace(0.0, 1.0, len(t))[:, None] * (after.mean(axis=0) - before.mean(axis=0)) + before.mean(
-        axis=0
-    )
-    run = _integrals(t, values - line)
+    notes: tuple[Finding, ...] = ()
+    if len(before):
+        change = after.mean(axis=0) - before.mean(axis=0)
+        line = np.linspace(0.0, 1.0, len(t))[:, None] * change + before.mean(axis=0)
+    else:
+        line = np.broadcast_to(np.asarray(bias), values.shape)
+        cut_off = _cut_off(row, values - line)
+        if isinstance(cut_off, Flaw):
+            return cut_off
+        notes = cut_off
+    run = np.cumsum(cells[:, None] * (values - line), axis=0)
     angle = row.angle.value * (run @ run[-1]) / (run[-1] @ run[-1])
-    cosine_sine = tuple(float(np.trapezoid(f(angle), t)) / duration for f in (np.cos, np.sin))
+    cosine_sine = float(cells @ np.cos(angle)) / duration, float(cells @ np.sin(angle)) / duration
     section = dataclasses.replace(
-        section_of(row),
-        gyro=np.asarray(np.trapezoid(values, t, axis=0) / duration),
-        duration=duration,
-        cosine_sine=(cosine_sine[0], cosine_sine[1]),
+        section_of(row), gyro=cells @ values / duration, duration=duration, cosine_sine=cosine_sine
     )
     rests: tuple[Array, ...] = ()
     if stretch.acc is not None:
@@ -278,7 +272,7 @@ def _turn(stretch: Stretch) -> _Read | str:
             section = dataclasses.replace(section, acc=rests[0].mean(axis=0), acc_after=rests[1].mean(axis=0))
         else:
             rests = ()
-    return _Read(section, rests, (before, after), len(t))
+    return _Read(section, rests, (before, after) if len(before) else (), len(t), notes)
 
 
 def _rests_in(row: SectionRow, stretches: Sequence[Stretch]) -> bool:
@@ -290,10 +284,10 @@ def _ends_of(turn: _Read) -> list[_Read]:
     """The rests before and after a turn of a gyro alone, which tell its bias."""
     step = turn.section.duration / max(turn.gyro_samples - 1, 1)
     ends = []
-    for values, end in zip(turn.gyro, ("before", "after"), strict=True):
+    for values, end in zip(turn.gyro, ENDS, strict=True):
         rest = Section(
             "rest",
-            name=f"{turn.section.name}, {end}",
+            name=f"{turn.section.name}{end}",
             where=turn.section.where,
             why=turn.section.why,
             gyro=values.mean(axis=0),
@@ -305,10 +299,38 @@ def _ends_of(turn: _Read) -> list[_Read]:
     return ends
 
 
-def _integrals(t: Array, values: Array) -> Array:
-    """Running integrals (n, 3) of values (n, 3)."""
-    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None]
-    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+def _cut_off(row: SectionRow, rate: Array) -> Flaw | tuple[Finding, ...]:
+    """A finding about a turn that is under way at an end of its stretch, with the harm that this may do, or a flaw.
+
+    ``rate`` (n, 3) is the output less that at rest. At a steady deceleration the square of the share of the rate at the
+    end is that of the angle that is missing.
+    """
+    assert row.angle is not None
+    largest = float(np.max(np.abs(rate)))
+    if np.max(np.abs(rate.mean(axis=0))) < FINDING.faint_turn * largest or largest == 0.0:
+        return Flaw("poor_section", "nothing turns in it")
+    edges = [float(np.max(np.abs(part.mean(axis=0)))) for part in (rate[:_EDGE], rate[-_EDGE:])]
+    share = max(edges) / largest
+    if share <= LIMITS.cut_rate:
+        return ()
+    end = "begin" if edges[0] == max(edges) else "end"
+    way = f"under way at its {end}, at {100.0 * share:.0f} % of its largest rate"
+    if share > LIMITS.lost_rate:
+        return Flaw("poor_section", f"it is {way}, so that its angle is not known")
+    axis = "xyz"[int(np.argmax(np.abs(rate.mean(axis=0) if row.axis is None else row.axis)))]
+    gains = (f"S_{axis}", *(f"T_{i}{axis}" for i in "xyz" if i != axis))
+    small = share**2 * abs(row.angle.value) < row.angle.u
+    text = f"{row.section} is {way}: some of its angle is cut off."
+    act = f"Move its {end} to where it rests, or state the u of its angle."
+    return (Finding("turn_cut", text, _where(row), () if small else gains, action=act),)
+
+
+def lengths_of(t: Array) -> Array:
+    """Length of time (n,) that each sample stands for [s]: half the way to its neighbours, at the ends a whole interval
+    as inside, so that with even stamps an integral is the sum over the rate."""
+    steps = np.diff(t)
+    padded = np.concatenate([steps[:1], steps, steps[-1:]])
+    return np.asarray(0.5 * (padded[:-1] + padded[1:]))
 
 
 def motion_between_rests(t: Array, gyro: Array) -> tuple[int, int] | str:

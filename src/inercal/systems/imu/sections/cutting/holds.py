@@ -9,7 +9,7 @@ against that of the others, for a smooth turn about the vertical leaves the acce
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,19 @@ class Holds:
     gyro: tuple[Dwell, ...]
     unused: tuple[UnusedHold, ...]
     calmest: int = 0
+
+    @property
+    def rests(self) -> tuple[Dwell, ...]:
+        """Holds of the accelerometers without the begin and end of motions, which the gyro sees first: their means and
+        the moves between them need all of the motion outside. In a restless hand one stays as it is."""
+        return tuple(_still_for_both(hold, self.gyro) for hold in self.acc)
+
+
+def _still_for_both(hold: Dwell, of_gyro: Sequence[Dwell]) -> Dwell:
+    """A hold as far as the gyro rests in it, where that is most of it."""
+    both = [replace(one, start=max(one.start, hold.start), stop=min(one.stop, hold.stop)) for one in of_gyro]
+    longest = max(both, key=lambda one: one.samples, default=hold)
+    return longest if longest.samples > LIMITS.still_for_both * hold.samples else hold
 
 
 @np.errstate(divide="ignore", invalid="ignore")  # what is not finite is no hold

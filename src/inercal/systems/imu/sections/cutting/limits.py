@@ -16,6 +16,9 @@ class Limits:
     blocks_of_window: int = 4
     """Blocks of a window: windows begin at every block."""
 
+    still_for_both: float = 0.8
+    """Part of a hold of the accelerometers in which the gyro rests too, from which it is cut to that."""
+
     shortest_hold: float = 0.65
     """Shortest hold [s] that is read."""
 
@@ -105,6 +108,9 @@ class Limits:
 
     least_turn: float = 0.2
     """Rotation, as a part of the largest between two holds, from which it may be a turn."""
+
+    faint_turn: float = 0.05
+    """Mean rate in the stretch of a turn, as a part of the largest, below which nothing turns in it."""
 
     whole_turn: float = 0.1
     """Part by which the gyro's reading may miss whole turns that are taken for granted."""

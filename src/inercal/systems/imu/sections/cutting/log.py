@@ -15,7 +15,7 @@ from inercal.systems.imu.sections.cutting.checks import direction
 from inercal.systems.imu.sections.cutting.cut import TriadSamples
 from inercal.systems.imu.sections.cutting.holds import Holds, UnusedHold, holds_of, steady_rates
 from inercal.systems.imu.sections.cutting.limits import LIMITS
-from inercal.systems.imu.sections.cutting.table import SectionRow, quantity_of
+from inercal.systems.imu.sections.cutting.table import SectionRow
 
 
 def rows_of_log(
@@ -30,7 +30,7 @@ def rows_of_log(
     t = clock.t
     rate = None if gyro is None else on_clock(gyro, t)
     found = holds_of(t, None if acc is None else acc.values, rate)
-    holds = found.acc if acc is not None else found.gyro
+    holds = found.rests if acc is not None else found.gyro
     turning: tuple[Dwell, ...] = ()
     if rate is not None and gyro_scale is not None:
         # a file that never stops turning looks as still as one at rest
@@ -195,8 +195,6 @@ def _turns(
     found = list(_rotations(t, rate, holds, acc, steady))
     largest = max((float(np.linalg.norm(rotation)) for _, _, rotation in found), default=0.0)
     rows: list[SectionRow] = []
-    whole: list[str] = []
-    asked: list[str] = []
     for before, after, rotation in found:
         size = float(np.linalg.norm(rotation))
         axis = int(np.argmax(np.abs(rotation)))
@@ -208,35 +206,17 @@ def _turns(
         )  # fmt: skip
         way = direction(rotation)
         turns = 0.0 if gyro_scale is None else rotation[axis] / gyro_scale / (2.0 * np.pi)
-        if round(turns) and abs(turns / round(turns) - 1.0) < LIMITS.whole_turn:
-            why = f"detected, {360.0 * turns:.0f} deg by the gyro, taken as whole turns"
-            rows.append(replace(row, angle=quantity_of(2.0 * np.pi * round(turns), 0.0, "deg"), why=why))
-            whole.append(rows[-1].section)
-        elif sided:
-            about = f"about {360.0 * abs(turns):.0f} deg" if gyro_scale else "a turn"
+        whole = bool(round(turns)) and abs(turns / round(turns) - 1.0) < LIMITS.whole_turn
+        if whole or sided:
+            about = f"{360.0 * turns:.0f} deg by the gyro" if gyro_scale else "a turn"
             rows.append(replace(row, why=f"detected, {about} about {way}: which angle?"))
-            asked.append(rows[-1].section)
-    findings = []
-    if whole:
-        findings.append(
-            Finding(
-                "whole_turns",
-                f"{counted(len(whole), 'turn')} of {file} {'is' if len(whole) == 1 else 'are'} taken as whole turns.",
-                file,
-                action="Write the true angle into the column `angle` of sections.csv where it is another one.",
-            )
-        )
-    if asked:
-        findings.append(
-            Finding(
-                "not_stated",
-                f"The angle of {counted(len(asked), 'turn')} of {file} is not known.",
-                file,
-                action="Write it into the column `angle` of sections.csv, with its sign.",
-                harm=EVERYTHING,
-            )
-        )
-    return rows, findings
+    if not rows:
+        return [], []
+    # where there are accelerometers its rests and what the gyro carries between them count as a move
+    harm = EVERYTHING if acc is None else ()
+    headline = f"The angle of {counted(len(rows), 'turn')} of {file} is not known."
+    action = "Write it with its sign into the column `angle` of sections.csv: 360 deg, or 360(2) deg by hand."
+    return rows, [Finding("not_stated", headline, file, harm, action=action)]
 
 
 def _rotations(

@@ -10,6 +10,7 @@ import numpy as np
 
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.records.checks.stretches import erased
 from inercal.foundation.records.checks.values import at_ends
 from inercal.foundation.records.places import counted, counted_names
 from inercal.foundation.records.record import Record
@@ -43,13 +44,15 @@ class Proposal:
     unused: dict[str, str]
     questions: tuple[Finding, ...]
     notes: tuple[Finding, ...] = ()
-    """Findings that ask nothing and do no harm, such as holds of no use."""
+    """Findings that ask nothing, such as holds of no use."""
     moves: tuple[NamedMove, ...] = ()
     swings: tuple[SwingStretch, ...] = ()
     triads: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]] = field(default_factory=dict)
     """Accelerometers and gyro of recordings by name."""
     steps: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Steps of the axes of the gyro that hide its noise at rest [output]; 0 for others."""
+    numbered: bool = False
+    """True of poses in the hand, which a study leaves out by their numbers."""
 
     @staticmethod
     def of(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Proposal:
@@ -89,13 +92,14 @@ class Proposal:
         scales = {_scale(file.record) for file in files if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
         asked = [*questions, *contradictions(sections, scale)]
-        notes = tuple(one for one in asked if not one.harm and one.code != "not_stated")
+        notes = tuple(one for one in asked if not one.harm)
         asked = [one for one in asked if one not in notes]
-        return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), notes)
+        return Proposal._whole(rows, sections, recorded, done.unused, tuple(asked), (*notes, *done.notes))
 
     @staticmethod
-    def by(rows: Sequence[SectionRow], records: Mapping[str, Record]) -> Proposal:
-        """The sections that rows state of recordings, given by the names of their files.
+    def by(rows: Sequence[SectionRow], records: Mapping[str, Record], *, backward: bool = False) -> Proposal:
+        """The sections that rows state of recordings, given by the names of their files; ``backward`` is a gyro that
+        counts against the right-hand rule.
 
         Raises
         ------
@@ -106,7 +110,7 @@ class Proposal:
         """
         files = {name: RecordedTriads.of(name, record) for name, record in records.items()}
         only = next(iter(files)) if len(files) == 1 else ""
-        rows = [replace(row, file=row.file or only) for row in rows]
+        rows = [_by_label(replace(row, file=row.file or only), files) for row in rows]
         for row in rows:
             if row.file not in files:
                 raise StudyError(
@@ -130,7 +134,8 @@ class Proposal:
         sections += done.sections
         scales = {_scale(file.record) for file in files.values() if file.gyro is not None}
         scale = scales.pop() if len(scales) == 1 else None
-        return Proposal._whole(rows, sections, recorded, done.unused, contradictions(sections, scale), ())
+        asked = contradictions(sections, scale, backward=backward)
+        return Proposal._whole(rows, sections, recorded, done.unused, asked, done.notes)
 
     @staticmethod
     def _whole(
@@ -288,6 +293,35 @@ def _of_claim(said: Claim, name: str, file: str, why: str) -> SectionRow:
     )  # fmt: skip
 
 
+def _by_label(row: SectionRow, files: Mapping[str, RecordedTriads]) -> SectionRow:
+    """The row with the stretch of the label that is its name, where it states no times or is of a file that is not
+    there.
+
+    Raises `StudyError` where it states others.
+    """
+    for name, file in files.items():
+        clock = file.acc or file.gyro
+        assert clock is not None
+        labels = file.record.labels
+        if (
+            len(labels) != len(clock.t)
+            or (row.file in files and row.file != name)
+            or row.section not in labels
+        ):
+            continue
+        t = clock.t[np.array(labels) == row.section]
+        begin, end = float(np.nanmin(t)), float(np.nanmax(t))
+        if row.file not in files or (row.begin is None and row.end is None):
+            return replace(row, file=name, begin=begin, end=end)
+        if (row.begin or -np.inf) > end or (row.end or np.inf) < begin:
+            raise StudyError(
+                f"section {row.section}",
+                f"found the label {row.section} from {begin:.2f} s to {end:.2f} s of {name}, outside its begin and "
+                "end, expected one of the two: leave begin and end blank, or rename it",
+            )
+    return row
+
+
 def _asked(file: str, rows: Sequence[SectionRow]) -> list[Finding]:
     """The question after the angles of turns that names or labels leave open."""
     turns = [row for row in rows if row.kind == "turn" and row.angle is None]
@@ -324,7 +358,8 @@ def _samples(record: Record, sensor: str) -> TriadSamples | None:
     if all(f"{sensor}_{axis}" in record for axis in "xyz"):
         triad = record.triad(sensor)
         clipped = np.any([at_ends(values) for values in triad.values.T], axis=0)
-        return TriadSamples(triad.t, triad.values, np.asarray(clipped))
+        values = np.where(erased(triad.values)[:, None], np.nan, triad.values)
+        return TriadSamples(triad.t, values, np.asarray(clipped))
     return None
 
 

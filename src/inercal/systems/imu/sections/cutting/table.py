@@ -20,6 +20,7 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.errors import QuantityError, StudyError
 from inercal.foundation.units import Quantity, parse_quantity, parse_unit, shown
 from inercal.systems.imu.sections.section import Kind
+from inercal.systems.imu.settings import SectionsSettings
 
 RowKind = Literal[Kind, "move", "swing"]
 
@@ -33,31 +34,46 @@ _KELVIN = parse_unit("K")
 
 @dataclass(frozen=True, eq=False)
 class SectionRow:
-    """One row: a section by name, its stretch of a file, and what is known of it; SI, None or empty: not known."""
+    """One row: a section by name, its stretch of a file, and what is known of it; None or empty: not known.
+
+    SI; directions are unit vectors on the axes of the case, the temperature is in K. The texts of the fields are those
+    of the columns, for people.
+    """
 
     section: str
+    """Its name; that of a label of the recording, where begin and end are blank, is the stretch of that label."""
     file: str = ""
+    """Recording that it is in; blank where there is only one."""
     begin: float | None = None
+    """Time of its begin in the recording, such as 25.8 s; blank: the first."""
     end: float | None = None
+    """Time of its end; blank: the last."""
     kind: RowKind = "rest"
+    """One of rest, rate, turn (from rest to rest), move (between two rests, nobody knows by what), swing."""
     up: Array | None = None
-    """Direction (3,) of specific force, a unit vector on the axes of the case."""
+    """Axis of the case that points up, such as +x, or three numbers; blank: not known."""
     force: Array | tuple[str, str, str] | None = None
-    """Specific force (3,) [m/s^2], or the three channels that hold it."""
+    """Specific force as another instrument measured it: three numbers and a unit, or three channels."""
     axis: Array | None = None
-    """Axis (3,) of the rotation, a unit vector."""
+    """Axis of the rotation by the right-hand rule, such as +z; blank: not known."""
     rate: Quantity | None = None
+    """Rate about it, with its standard uncertainty: 30.000(3) deg/s."""
     angle: Quantity | None = None
+    """Angle of a turn about it: -360.0(5) deg."""
     placing: float | None = None
-    """Standard uncertainty of ``up`` and ``axis`` in either direction across [rad]."""
+    """Standard uncertainty of up and axis, in either direction across; blank: that of the study, else found."""
     level: float | None = None
-    """The axis is vertical within so much [rad]."""
+    """The axis is vertical within this."""
     setup: str = ""
+    """Word that sections share between which nobody touched the unit: they share its placing."""
     session: str = ""
+    """Word that sections of one turn-on share: they share its biases."""
     rate_group: str = ""
+    """Word that sections share whose rates have one error."""
     scatter: str = ""
+    """Word that sections share whose means scatter alike."""
     temperature: float | None = None
-    """Temperature [K]."""
+    """Temperature of the unit."""
     why: str = ""
     """Source of what is known: name, label, row, how it was detected; or what is to be answered."""
 
@@ -67,6 +83,14 @@ COLUMNS = tuple(field.name for field in fields(SectionRow))
 
 _WRITTEN = ("section", "file", "begin", "end", "kind", "up", "axis", "rate", "angle", "setup")
 """Columns that are written also where no row says anything."""
+
+
+def stated_rows(options: SectionsSettings) -> tuple[SectionRow, ...]:
+    """The rows that a study states, in a table or by itself; none where names and recordings are to tell them.
+
+    Raises `StudyError`.
+    """
+    return read_table(options.table) if options.table is not None else of_tables(options.rows)
 
 
 def read_table(path: str | Path) -> tuple[SectionRow, ...]:
@@ -80,11 +104,13 @@ def read_table(path: str | Path) -> tuple[SectionRow, ...]:
     except (OSError, UnicodeDecodeError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not UTF-8 text"
         raise StudyError(path, f"cannot be read ({why}), {expected}") from error
-    lines = csv.reader(text.splitlines(), strict=True)
+    # lines that begin with # are remarks; blank ones keep the numbers of the others
+    said = ["" if line.startswith("#") else line for line in text.splitlines()]
+    lines = csv.reader(said, strict=True)
     tables: list[dict[str, str]] = []
     places: list[str] = []
     try:
-        head = [cell.strip() for cell in next(lines, [])]
+        head = [cell.strip() for cell in next((cells for cells in lines if cells), [])]
         for name in head:
             if name not in COLUMNS or head.count(name) > 1:
                 found = f"found the column {shown(name)}{' a second time' if name in COLUMNS else ''}"

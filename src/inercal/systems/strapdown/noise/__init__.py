@@ -1,1 +1,0 @@
-"""Noise that a recording shows, and effects outside the model."""

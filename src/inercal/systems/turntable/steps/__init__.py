@@ -1,1 +1,0 @@
-"""Test by small steps about level: threshold, dead zone and hysteresis of accelerometers."""
