@@ -297,7 +297,7 @@ CEILINGS = {
     "names used across folders": 1493,
     "class names shared": 5,
     "constants outside Limits": 447,
-    "modules": 648,
+    "modules": 649,
 }
 
 

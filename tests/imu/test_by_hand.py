@@ -276,8 +276,8 @@ def variants(t, acc, gyro):
 
 
 def most_growth(what, head):
-    """Growth of u at most, beyond that by the number of samples: where poses, or all moves, are lost, 3; of biases of
-    the gyro, whose noise may be told by 8 degrees of freedom, so that u scatters by 1/sqrt(16), 1.3 (1 + 2/sqrt(16))."""
+    """Growth of u at most, beyond that by the number of samples: where poses, or all moves, are lost, 3; of biases of a
+    gyro, whose noise may be told by 8 degrees of freedom, so that u scatters by 1/sqrt(16), 1.3 (1 + 2/sqrt(16))."""
     if "cut" in what or what == "no gyro":
         return 3.0
     return 1.95 if head == "D_F" else 1.3
