@@ -21,7 +21,6 @@ from inercal.foundation.inference.consistency import coverage
 from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
 from inercal.systems.imu.aided.coefficients import circumstances_of, names_of
 from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
-from inercal.systems.imu.multiposition.accelerometer import SQUARES
 
 SEED = 20261121
 METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")
@@ -33,7 +32,10 @@ CAMPAIGNS = {
     "known_rates": (rows.one_of_known_rates, OF_RATES),
     "known_turns": (rows.one_of_known_turns, GYRO_TRIAD),
     "multiposition, K2 drawn": (rows.one_with_k2, BY_HAND),
-    "multiposition, K2 fitted": (rows.one_with_k2_fitted, (*ACCELEROMETER_TRIAD, *SQUARES, *GYRO_TRIAD)),
+    "multiposition, K2 fitted": (
+        rows.one_with_k2_fitted,
+        (*ACCELEROMETER_TRIAD, "K2_x", "K2_y", "K2_z", *GYRO_TRIAD),
+    ),
     "multiposition": (by_hand.one_calibration, BY_HAND),
     "multiposition, g-sensitivity": (
         by_hand.one_calibration_with_g_sensitivity,

@@ -1,13 +1,11 @@
-"""Sections of an IMU beside the methods of today: the recording that ships by its moves, and a unit that never rests.
+"""An IMU by sections: the recording that ships by its moves, and a unit that never rests.
 
     python benchmarks/imu_sections.py
 
-Processor time of each, the scale factors of the gyro beside those of `multiposition` (their difference in its u), what
-is off in the record, and the accelerometers of a simulated swing beside the truth.
+Processor time of each, the scale factors of the gyro, and the accelerometers of a simulated swing beside the truth.
 """
 
 import time
-from itertools import pairwise
 
 import numpy as np
 from dialects.motion import truth
@@ -15,15 +13,11 @@ from dialects.motion import truth
 from inercal.examples import FOLDER
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.records.read import read
-from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
-from inercal.systems.imu.sections.carried import Move
-from inercal.systems.imu.sections.outlying import outlying_of
 from inercal.systems.imu.sections.priors import Priors, Size
-from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.swing import swing_calibration
 from inercal.systems.imu.sections.swing_gyro import gravity_turns, swing_gyro
-from inercal.systems.imu.sections.with_moves import calibrate_with_moves
 from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.task import calibrate
 
 SITE = Site(9.81744, (GravityInput("gravity", 2e-5, "m/s^2", 1.0),))
 
@@ -36,33 +30,13 @@ def timed(work):
 
 
 def by_moves():
-    """The shipped recording by its rests and moves, beside `multiposition`, whose holds they are."""
+    """The shipped recording by the poses and moves that are found in it."""
     record = read([FOLDER / "xsens_acc.mat", FOLDER / "xsens_gyro.mat"], FOLDER / "xsens-map.toml")
-    settings = ImuSettings(SITE, 50.0, g_sensitivity=True, time_base_u=2e-5)
-    today, of_today = timed(lambda: calibrate_multiposition(record, settings))
-    holds, acc, gyro = today.poses.dwells, today.recording.accelerometer, today.recording.gyro
-    sections = [
-        Section(
-            "rest",
-            acc=hold.of(acc.values).mean(axis=0),
-            gyro=hold.of(gyro.values).mean(axis=0),
-            duration=float(acc.t[hold.stop - 1] - acc.t[hold.start]),
-        )
-        for hold in holds
-    ]
-    spans = [slice(one.stop - 1, other.start + 1) for one, other in pairwise(holds)]
-    moves = [Move(k, k + 1, acc.t[span], gyro.values[span], acc.values[span]) for k, span in enumerate(spans)]
-    priors = Priors(SITE, acc_scale=None, gyro_scale=None, clock_u=2e-5)
-    found, of_moves = timed(lambda: calibrate_with_moves(sections, moves, priors))
-    print(
-        f"xsens: multiposition {of_today:.2f} s, moves {of_moves:.2f} s; outlying: {outlying_of(found.calibration)}"
-    )
+    settings = ImuSettings(SITE, 50.0, time_base_u=2e-5)
+    found, seconds = timed(lambda: calibrate(record, settings).estimate)
+    print(f"xsens: {seconds:.2f} s; {found.message}")
     for name in ("S_x", "S_y", "S_z"):
-        value, u, _ = found.calibration.value(name)
-        theirs = today.estimate[name]
-        print(
-            f"  {name} {value:.6g}, {(value - theirs.value) / theirs.u:+.2f} u of today's, u {u / theirs.u:.2f} of it"
-        )
+        print(f"  {name} {found[name].value:.6g} ± {found[name].u:.2g}")
 
 
 def by_swing():

@@ -47,10 +47,10 @@ from inercal.systems.aoa.fusion import smoother
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.settings import Timing
 from inercal.systems.aoa.simulate import simulate
-from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, hand_poses
 from inercal.systems.imu.simulate import simulate as simulate_imu
+from inercal.systems.imu.task import calibrate as calibrate_imu
 from inercal.systems.selfcal.filters.problem import problem as platform_problem
 from inercal.systems.selfcal.filters.run import estimate as estimate_platform
 from inercal.systems.selfcal.simulate import experiment
@@ -146,9 +146,7 @@ def of_poses(quick: bool) -> list[Curve]:
     for poses in (14, 20) if quick else (14, 28, 56, 112, 224):
         rng = np.random.default_rng(poses)
         record, _ = simulate_imu(draw_truth(rng), hand_poses(rng, poses), 9.81, 0.8, rng, rate=50.0)
-        works.append(
-            (poses, lambda record=record: calibrate_multiposition(record, ImuSettings(Site(9.81))), 1)
-        )
+        works.append((poses, lambda record=record: calibrate_imu(record, ImuSettings(Site(9.81))), 1))
     return measured("IMU by hand", "poses", 1 if quick else 2, {"inercal, with uncertainties": works})
 
 

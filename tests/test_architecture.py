@@ -194,7 +194,7 @@ def test_no_circles():
 #: rooms within a system, lowest first: a module imports from its own room and those before it
 WITHIN = {
     "imu": (
-        "limits identified recording rows turns settings second_order simulate multiposition "
+        "limits identified recording rows turns settings simulate "
         "sections ferraris aided temperature task figures verbs system"
     ),
     "strapdown": "limits model settings simulate reading fit before result task figures verbs system",
@@ -268,9 +268,7 @@ def test_rooms_within_a_system_stand_on_each_other(system):
 
 
 def test_methods_of_an_imu_do_not_know_each_other():
-    methods = {
-        f"inercal.systems.imu.{method}" for method in ("multiposition", "aided", "sections", "temperature")
-    }
+    methods = {f"inercal.systems.imu.{method}" for method in ("aided", "sections", "temperature")}
 
     def method_of(module):
         return methods & {".".join(module.split(".")[:4])}
@@ -584,5 +582,5 @@ except ImportError:
     finally:
         del TREES["sample"]
     assert len(MODULES) > 40
-    assert floor("inercal.systems.imu.multiposition.figures") > floor("inercal.systems.imu.task")
+    assert floor("inercal.systems.imu.sections.figures") > floor("inercal.systems.imu.task")
     assert room("inercal.foundation.records.read.text") == "records"

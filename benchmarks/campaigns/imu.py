@@ -7,9 +7,9 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput, Site
-from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
+from inercal.systems.imu.task import calibrate as calibrate_imu
 
 GRAVITY, GRAVITY_U = 9.81, 1e-4
 """Gravity as stated to the calibration [m/s^2], and its standard uncertainty."""
@@ -45,7 +45,7 @@ def _one(rng: np.random.Generator, g_sensitivity: float) -> dict[str, Array]:
     record, truth = simulate(truth, hand_poses(rng, 24), gravity, LATITUDE, rng, rate=50.0, clock=clock)
     site = Site(GRAVITY, (GravityInput("gravity", GRAVITY_U, "m/s^2", 1.0),), LATITUDE)
     settings = ImuSettings(site, g_sensitivity=g_sensitivity > 0.0, time_base_u=TIME_BASE_U, k2_u=0.0)
-    estimate = calibrate_multiposition(record, settings).estimate
+    estimate = calibrate_imu(record, settings).estimate
     true = truth.values()
     return {
         "error": estimate.values - np.array([true[name] for name in estimate.names]),

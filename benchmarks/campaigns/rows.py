@@ -17,7 +17,6 @@ from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
 from inercal.systems.imu.settings import (
     Disturbances,
     ImuSettings,
@@ -27,6 +26,7 @@ from inercal.systems.imu.settings import (
 )
 from inercal.systems.imu.simulate import draw_truth, hand_poses, simulate
 from inercal.systems.imu.task import calibrate, calibrate_files
+from inercal.systems.imu.task import calibrate as calibrate_imu
 
 G = 9.81
 SITE = Site(G, (GravityInput("gravity", 2e-4, "m/s^2", 1.0),), 0.8, 0.0)
@@ -163,7 +163,7 @@ def one_with_k2(rng, fitted=False):
     disturbed = Disturbances(k2=k2)
     record, truth = simulate(truth, poses, G, by_hand.LATITUDE, rng, rate=50.0, disturbances=disturbed)
     settings = replace(ImuSettings(Site(G, (), by_hand.LATITUDE)), k2=fitted)
-    estimate = calibrate_multiposition(record, settings).estimate
+    estimate = calibrate_imu(record, settings).estimate
     true = truth.values() | {f"K2_{axis}": k2 for axis in "xyz"}
     return {
         "error": estimate.values - np.array([true[name] for name in estimate.names]),

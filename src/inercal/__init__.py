@@ -70,8 +70,8 @@ Map, lower floors first; each imports only from those above its own line
     examples                   recordings that ship
 
     systems: contract (what a system offers), listed (all of them), and a room for each
-    imu                        multiposition (poses, accelerometer, turns, gyro), ferraris, aided, sections (cutting,
-                               problem, calibration, shorthands), temperature, task
+    imu                        sections (cutting, problem, moves, calibration, shorthands), ferraris, aided,
+                               temperature, task
     strapdown                  model (coefficients, samples, kernels), fit (rests, batch, error_state), before (bounds,
                                design), noise (restricted, left_out, considered), result, simulate, task
     turntable                  sensitivity, design, drift and rate calibration: model, regression, simulate, task

@@ -7,8 +7,9 @@ from independent import imu
 from recordings import record_of
 
 from inercal.foundation.geometry.earth import Site
-from inercal.systems.imu.multiposition.calibration import MultipositionCalibration, calibrate_multiposition
+from inercal.systems.imu.sections.outcome import CalibrationFromSections
 from inercal.systems.imu.settings import ImuSettings
+from inercal.systems.imu.task import calibrate
 
 SETTINGS = ImuSettings(Site(imu.G, (), imu.LATITUDE))
 
@@ -23,13 +24,13 @@ def calibrated(
     acc_noise=8e-4,
     gyro_noise=5.6e-4,
     **options,
-) -> tuple[MultipositionCalibration, np.ndarray]:
+) -> tuple[CalibrationFromSections, np.ndarray]:
     """The calibration of a simulated unit, and errors over u of its coefficients that have a truth."""
     rng = np.random.default_rng(seed)
     made = imu.unit(rng, acc_noise=acc_noise, gyro_noise=gyro_noise)
     made.k2 = np.broadcast_to(k2, 3)
     t, acc, gyro = imu.record(rng, made, ups(rng, poses), faults, **options)
-    calibration = calibrate_multiposition(record_of(t, acc, gyro, "m/s^2", "rad/s"), settings)
+    calibration = calibrate(record_of(t, acc, gyro, "m/s^2", "rad/s"), settings)
     estimate, truth = calibration.estimate, made.truth()
     errors = [
         (value - truth[name]) / u

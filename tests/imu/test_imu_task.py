@@ -6,14 +6,13 @@ from recordings import shipped
 
 from inercal.foundation.geometry.earth import Site
 from inercal.systems.imu.aided.calibration import AidedCalibration
-from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 from inercal.systems.imu.task import calibrate
 
 
 def test_the_settings_choose_the_method():
     for name, kind in (
-        ("mpu6050", MultipositionCalibration),
+        ("mpu6050", CalibrationFromSections),
         ("ferraris", CalibrationFromSections),
         ("table", AidedCalibration),
     ):

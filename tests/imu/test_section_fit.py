@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ferraris_sessions import UNSURE, options_of, record_of
-from section_protocols import poses
 from turned_units import DEG, SIDES, Bench, Unit
 
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
-from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.sections.calibration import calibrate_sections
 from inercal.systems.imu.sections.outputs import misfit, rows
 from inercal.systems.imu.sections.priors import Priors, Size
@@ -189,19 +187,6 @@ def test_means_of_six_sides_give_half_differences():
         value, u, _ = found.value(f"K1_{axis}")
         assert abs(value - want) < 0.1 * u
         assert 2e-4 < u < 2.5e-3
-
-
-def test_poses_of_no_direction_give_what_the_size_of_gravity_gives():
-    """The method of pose means, which has the size of gravity alone; scatter and U are those of Student there."""
-    unit = Unit(np.random.default_rng(11), upper=True, k2=0.0)
-    sections = [replace(s, gyro=None) for s in poses(Bench(unit, stated=False), 24)]
-    found = calibrate_sections(
-        sections, Priors(Site(unit.gravity), k2=0.0, misalignment=1.0, acc_scale=Size(1.0, 1e3))
-    )
-    today = fit_accelerometer(np.array([s.acc for s in sections]), unit.gravity)
-    for name, value in zip(today.names, today.fit.x, strict=True):
-        mine, u, _ = found.value(name)
-        assert abs(mine - value) < 0.05 * u, name
 
 
 @pytest.mark.parametrize("name", ["ferraris", "ferraris-si"])

@@ -1,4 +1,4 @@
-"""K2 of accelerometers in the hand: fitted where it is asked for, and else in u, and named where it shows."""
+"""K2 of accelerometers in the hand: fitted, with what is known of it beforehand."""
 
 from dataclasses import replace
 
@@ -12,41 +12,11 @@ from scipy.stats import chi2
 from inercal.faces.studies.imu import imu_study
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Status
-from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer, specific_force
 from inercal.systems.imu.task import calibrate
 from rows import for_each
 
-G = 9.81
 FITTED = replace(SETTINGS, k2=True)
 NAVIGATION = {"acc_noise": 2e-5, "gyro_noise": 1e-6}
-
-
-def outputs(rng, n, k2):
-    """Means of a unit in ``n`` poses, K1 (l + K2 l^2) + K0 written out here."""
-    made = imu.unit(rng)
-    f = imu.random_ups(rng, n) * G
-    along = f @ (made.A / np.diag(made.A)[:, None]).T
-    return made, f, np.diag(made.A) * (along + k2 * along**2) + made.a0
-
-
-def test_without_noise_the_truth_comes_back_and_derivatives_are_those_of_differences():
-    rng = np.random.default_rng(0)
-    k2 = np.array([2e-4, -1e-4, 5e-5])
-    made, f, y = outputs(rng, 20, k2)
-    acc = fit_accelerometer(y, G, squares=True)
-    truth = made.truth() | {f"K2_{axis}": k for axis, k in zip("xyz", k2, strict=True)}
-    np.testing.assert_allclose(acc.fit.x, [truth[name] for name in acc.names], atol=1e-9)
-    np.testing.assert_allclose(acc.f, f, atol=1e-8)
-    step = 1e-5
-    for i in range(3):
-        moved = acc.correct(y + step * np.eye(3)[i])
-        np.testing.assert_allclose(
-            (np.linalg.norm(moved, axis=1) - G) / step, acc.output_gradient()[:, i], atol=1e-6
-        )
-        square = specific_force(acc.model, acc.k2 + step * np.eye(3)[i], y)
-        np.testing.assert_allclose(
-            (square - acc.f) / step, acc.force_by_squares()[..., i], rtol=3e-2, atol=0.2
-        )
 
 
 def chi_square_of(runs, first=0):
@@ -75,51 +45,26 @@ def test_uncertainties_of_k2_are_true_in_100_runs():
     assert low < chi_square_of(100, 1000) < high
 
 
-def named_k2(estimate):
-    """The finding about K2."""
-    (finding,) = (f for f in estimate.findings if f.code == "unmodelled_k2")
-    return finding
-
-
-def test_nineteen_square_poses_of_a_good_unit_say_what_k2_would_do():
-    """K2 of 30 ug/g^2 shows: suspect, though u allows for it, and sound once it is fitted."""
-    k2 = 3e-6
-    left, error = calibrated(1, ups=imu.square_ups, poses=19, k2=k2, **NAVIGATION)
-    assert left.estimate.status is Status.SUSPECT
-    finding = named_k2(left.estimate)
-    assert {"K0_x", "K0_y", "K0_z"} <= set(finding.harm)
-    assert "imu.k2 = true" in finding.message
-    assert np.max(np.abs(error[:3])) < 2.0
-    exactly, error = calibrated(
-        1, settings=replace(SETTINGS, k2_u=0.0), ups=imu.square_ups, poses=19, k2=k2, **NAVIGATION
-    )
-    assert exactly.estimate.status is Status.SUSPECT
-    assert np.max(np.abs(error[:3])) > 4.0
-    fitted, error = calibrated(1, settings=FITTED, ups=imu.square_ups, poses=19, k2=k2, **NAVIGATION)
-    assert fitted.estimate.status is Status.OK
+def test_k2_of_a_good_unit_is_found():
+    """K2 of 30 ug/g^2, ten times its u: neither a bias nor a scale factor is off by it, which biases are without, nor
+    by the level part of earth rate, which a gyro of 1e-6 rad/s/sqrt(Hz) sees in all poses alike. (At 50 Hz the integral
+    of samples is 2 ppm off, 5 u.)"""
+    found, error = calibrated(1, ups=imu.square_ups, poses=19, k2=3e-6, rate=100.0, **NAVIGATION)
+    assert found.estimate.status is Status.OK
     assert np.max(np.abs(error)) < 5.0
-    assert fitted.estimate.parameters["K2_x"].unit == "1/(m/s^2)"
-
-
-def test_what_twelve_poses_leave_open_is_in_u_and_said():
-    left, _ = calibrated(2, poses=12, **NAVIGATION)
-    assert left.estimate.status is Status.OK
-    finding = named_k2(left.estimate)
-    assert "0 ± 30 ug/g^2" in finding.message
-    assert "add poses on the edges" in finding.message
-    assert finding.harm == ()
-    stated, _ = calibrated(2, settings=replace(SETTINGS, k2_u=1e-7), poses=12, **NAVIGATION)
-    assert "unmodelled_k2" not in {each.code for each in stated.estimate.findings}
-    assert stated.estimate["K0_x"].u < 0.7 * left.estimate["K0_x"].u
+    none = replace(SETTINGS, k2_u=0.0)
+    _, error = calibrated(1, settings=none, ups=imu.square_ups, poses=19, k2=3e-6, rate=100.0, **NAVIGATION)
+    assert np.max(np.abs(error[:3])) > 2.0
 
 
 def worst_of_shifts(k2, runs=4):
-    """Largest shift of a coefficient by K2 on all axes over u, rms over the runs that end ok, and their share."""
+    """Largest shift of another coefficient by K2 on all axes over u, rms over the runs that end ok, and their share."""
     shifts = []
     for seed in range(runs):
         sound, off = (calibrated(seed, k2=each)[0].estimate for each in (0.0, k2))
         if off.status is Status.OK:
-            shifts.append(np.max(np.abs(off.values - sound.values) / off.u))
+            others = [name for name in off.names if not name.startswith("K2")]
+            shifts.append(max(abs(off[name].value - sound[name].value) / off[name].u for name in others))
     return float(np.sqrt(np.mean(np.square(shifts)))) if shifts else 0.0, len(shifts) / runs
 
 

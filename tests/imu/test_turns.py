@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from inercal.foundation.geometry.rotations import exp, to_matrix
 from inercal.foundation.instruments.triad import TriadModel
-from inercal.systems.imu.multiposition.gyro import unpack
 from inercal.systems.imu.turns import (
     attitudes,
     carried,
@@ -19,6 +18,13 @@ from inercal.systems.imu.turns import (
 )
 
 RNG = np.random.default_rng(11)
+
+
+def unpack(theta):
+    """Triad and drift (3, q) of parameters: bias, scale, six misalignments by rows, and the rows of the drift."""
+    misalignment = np.eye(3)
+    misalignment[~np.eye(3, dtype=bool)] = theta[6:12]
+    return TriadModel(theta[3:6], misalignment, theta[:3]), theta[12:].reshape(3, -1)
 
 
 def some_turns(count=4, samples=120, rate=100.0):

@@ -62,7 +62,7 @@ def test_nothing_heavy_is_imported_before_it_is_needed():
         "faces.report.html",
         "faces.report.inspection",
         "faces.report.style",
-        "systems.imu.multiposition.figures",
+        "systems.imu.sections.figures",
         "systems.turntable.figures",
     )
     modules = ", ".join(f"inercal.{name}" for name in names)

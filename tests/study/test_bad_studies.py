@@ -59,8 +59,8 @@ def load(tmp_path):
             "ferraris: found with method = 'multiposition', expected it with ferraris only",
         ),
         (
-            IMU + 'method = "aided"\nbias_drift = true',
-            "bias_drift: found with method = 'aided', expected it with multiposition only",
+            IMU + "bias_drift = true",
+            "imu.bias_drift: found True, which is gone since 0.3.0, expected in its place nothing: moves have",
         ),
         (IMU + 'method = "six"', "imu.method: found 'six', expected 'multiposition'"),
         (IMU + 'static_start = "0 s"', "imu.static_start: found '0 s', expected a time above zero"),

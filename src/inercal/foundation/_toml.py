@@ -80,6 +80,8 @@ def _sentence(model: type[BaseModel], first: Any) -> str:
     """One sentence for one pydantic error."""
     key, value = _dotted(first["loc"]), first.get("input")
     match first["type"]:
+        case "extra_forbidden" if gone := in_place_of(key, ""):
+            return f"{key}: found {shown(value)}, {gone}"
         case "extra_forbidden":
             keys = _known_keys(model, first["loc"][:-1])
             near = difflib.get_close_matches(str(first["loc"][-1])[:80], keys, n=1, cutoff=0.5)

@@ -235,13 +235,15 @@ GONE: Mapping[tuple[str, str], str] = {
     **dict.fromkeys([("filter.kind", "mukf"), ("filter", "mukf")], "error-state"),
     **dict.fromkeys([("filter.kind", "linear"), ("filter", "linear")], "error-state"),
     **dict.fromkeys([("filter.kind", "lm"), ("filter", "lm")], "map"),
+    ("imu.bias_drift", ""): "nothing: moves have the bias of the rests beside them, and a drift is named",
     ("budget", "turn angle"): "angles and rates",
     ("budget", "alignment"): "placing or axes",
     ("budget", "time base"): "clock",
     ("budget", "horizontal earth rate"): "earth rate, level part",
     ("budget", "vertical earth rate"): "earth rate",
 }  # fmt: skip
-"""Choices that versions up to 0.2.0 had, by key, its last word or option, and choice: what to use in their place."""
+"""Choices that versions up to 0.2.0 had, by key, its last word or option, and choice, empty for the key itself: what to
+use in their place."""
 
 
 def in_place_of(key: str, choice: str) -> str | None:

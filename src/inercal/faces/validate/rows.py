@@ -10,7 +10,6 @@ from inercal.foundation.geometry.earth import Site
 from inercal.foundation.records.record import Record, record_of
 from inercal.foundation.results.result import Estimate
 from inercal.foundation.units import parse_unit
-from inercal.systems.imu.multiposition.accelerometer import fit_accelerometer
 from inercal.systems.imu.settings import ImuSettings, KnownRatesSettings, KnownTurnsSettings, MeansSettings
 from inercal.systems.imu.task import calibrate_files
 
@@ -60,9 +59,13 @@ def _means() -> Array:
 
 def _squares() -> Array:
     """Errors of twelve coefficients from 26 poses with K2."""
-    fit = fit_accelerometer(_outputs(_G * _ALONG, _K2), _G, squares=True).fit.x
+    record = _record("acc", _outputs(_G * _ALONG, _K2))
+    settings = ImuSettings(Site(_G), method=MeansSettings(), k2=True)
+    estimate = calibrate_files([record], settings).estimate
+    names = (*(f"{head}_{axis}" for head in ("K0", "K1") for axis in "xyz"), "M_xy", "M_xz", "M_yz")
+    found = np.array([estimate[name].value for name in (*names, "K2_x", "K2_y", "K2_z")])
     size = np.concatenate([np.full(6, 400.0), np.ones(3), np.full(3, 1.0 / _G)])
-    return np.asarray((fit - np.concatenate([_BIAS, _SCALE, _UPPER, _K2])) / size)
+    return np.asarray((found - np.concatenate([_BIAS, _SCALE, _UPPER, _K2])) / size)
 
 
 def _rates() -> Array:

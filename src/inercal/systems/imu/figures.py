@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from inercal.faces.report.html import Picture, render
 from inercal.systems.imu.aided.calibration import AidedCalibration
 from inercal.systems.imu.aided.figures import pictures as of_aided
-from inercal.systems.imu.multiposition.figures import pictures as of_multiposition
 from inercal.systems.imu.sections.figures import pictures as of_sections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-if TYPE_CHECKING:
-    from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
-
-    AnyCalibration: TypeAlias = MultipositionCalibration | AidedCalibration | CalibrationFromSections
+AnyCalibration: TypeAlias = AidedCalibration | CalibrationFromSections
 
 
 def pictures(calibration: AnyCalibration) -> list[Picture]:
@@ -24,8 +20,6 @@ def pictures(calibration: AnyCalibration) -> list[Picture]:
             return of_aided(calibration)
         case CalibrationFromSections():
             return of_sections(calibration)
-        case _:
-            return of_multiposition(calibration)
 
 
 def page(calibration: AnyCalibration) -> str:

@@ -15,11 +15,3 @@ def pose_words(direction: Array) -> str:
         for c, axis in zip(direction, "xyz", strict=True)
         if abs(c) > 0.3 * size
     )
-
-
-def spread_words(means: Array) -> str:
-    """Spread of the mean outputs of the poses, in words, where they do not fill a sphere."""
-    s = np.linalg.svd(means - means.mean(axis=0), compute_uv=False)
-    if s[1] < 0.05 * s[0]:
-        return "along one line"
-    return "in one plane" if s[2] < 0.05 * s[0] else "too unevenly"

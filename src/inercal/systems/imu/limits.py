@@ -17,16 +17,6 @@ class Limits:
     initial_rest: float = 5.0
     """Shortest period of rest [s] at the start of a recording by which its noise is judged."""
 
-    calm_variance: float = 3.0
-    """Variance of an output, over that of its calmest twentieth, below which a stretch is among the quietest."""
-
-    restless_variance: float = 1.5
-    """Variance of an output at the start, over that in the quietest stretches elsewhere, from which the start is
-    restless."""
-
-    fewest_at_rest: int = 16
-    """Samples of a stretch at rest that say something of the noise."""
-
     moving_variance: float = 30.0
     """Variance of an output, over that at rest, from which the instrument certainly moves."""
 
@@ -37,17 +27,8 @@ class Limits:
     """Rms angle [rad] between carried and measured verticals beyond which gyro and accelerometers contradict each
     other."""
 
-    rate_for_turns: float = 50.0
-    """Rate of samples [Hz] from which on a calibration as a strapdown unit is advised where poses say too little."""
-
-    rests_for_turns: int = 5
-    """Rests from which on it is."""
-
     outlier_risk: float = 5e-4
     """Accepted probability that a sound pose of a recording is named as outlying."""
-
-    turn_risk: float = 2e-3
-    """Accepted probability that a sound turn of a recording is named as outlying."""
 
     outlier_share: float = 0.2
     """Share of the poses, or turns, that outliers may be."""
@@ -58,24 +39,10 @@ class Limits:
     scatter_probability: float = 0.05
     """Probability below which more scatter than the noise explains is not put down to chance."""
 
-    low_scatter_probability: float = 0.01
-    """Probability below which less scatter than the noise explains is not: the noise at rest was not that of the
-    poses."""
-
-    condition: float = 50.0
-    """Condition number of the scaled Jacobian beyond which a combination of terms counts as weakly known; sound tests
-    have 2 to 20."""
-
     ordinary_clock: float = 50e-6
     """Relative error that the clock of a recorder has as a rule."""
 
-    # multi-position
-
-    fewest_poses: int = 10
-    """Poses that a fit needs: nine would fit nine parameters without a residual and prove nothing."""
-
-    poses_with_k2: int = 13
-    """Poses that a fit with K2 needs."""
+    # second-order coefficients, poses and moves
 
     ordinary_k2: float = 150e-6 / STANDARD_GRAVITY
     """Standard deviation [1/(m/s^2)] of second-order coefficients that are neither fitted nor stated, 150 ug/g^2, as
@@ -88,21 +55,14 @@ class Limits:
     """Scatter [m/s^2] of the mean specific force of a pose, 20 ug, up to which sensors are as good as those for
     navigation."""
 
-    k2_probability: float = 5e-4
-    """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
-
-    alone_probability: float = 0.01
-    """Probability below which the poses must show what the model lacks by their own scatter, that of the noise left
-    aside."""
-
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
 
+    k2_probability: float = 5e-4
+    """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
+
     clipped_part: float = 0.1
     """Part of the samples of a pose at the end of an accelerometer's range from which its mean counts as short."""
-
-    first_guess_miss: float = 0.5
-    """Miss [rad] of the first guess of the gyro beyond which no fit is tried; large misalignments leave 0.3 rad."""
 
     fewest_turns: int = 7
     """Turns that a fit of the gyro needs: each gives two equations for twelve parameters."""
@@ -110,10 +70,6 @@ class Limits:
     driver_probability: float = 1e-3
     """Probability below which a drift of biases or scale factors, or a dependence of the gyro's bias on the pose, is
     not put down to chance."""
-
-    gyro_drift_probability: float = 1e-2
-    """The same of a drift of the gyro's scale factors: turns are few, and what they show less clearly shifts values,
-    too. A sound recording is named once in a hundred, and stays ok where nothing is shifted by more than its u."""
 
     # rows of means, known rates and turns
 

@@ -313,7 +313,7 @@ class ImuSettings:
     ----------
     site : Site
         Local gravity and what it is uncertain by.
-    static_start, g_sensitivity, bias_drift, time_base_u
+    static_start, g_sensitivity, time_base_u
         As their keys say.
     g_sensitivity_u : float or None
         Of sections: its standard deviation about 0 [(rad/s)/(m/s^2)]; as usual for such gyros if absent.
@@ -337,7 +337,7 @@ class ImuSettings:
 
     site: Site
     static_start: float | None = quantity(
-        "length of the still period at the start; found automatically if absent", "time", example="50 s",
+        "length of the still period at the start; by the recording if absent", "time", example="50 s",
         bounds=TIME, kinds=("multiposition",),
     )  # fmt: skip
     g_sensitivity: bool = option(
@@ -346,9 +346,6 @@ class ImuSettings:
         kinds=("multiposition", "aided", "sections"),
     )
     g_sensitivity_u: float | None = None
-    bias_drift: bool = option(
-        "also estimate how the gyro's bias drifts with time", False, kinds=("multiposition",)
-    )
     k2: bool = False
     k2_u: float | None = None
     time_base_u: float = quantity(

@@ -26,10 +26,9 @@ from inercal.systems.imu.settings import (
 
 if TYPE_CHECKING:
     from inercal.systems.imu.aided.calibration import AidedCalibration
-    from inercal.systems.imu.multiposition.calibration import MultipositionCalibration
     from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
-    Calibrated = MultipositionCalibration | AidedCalibration | CalibrationFromSections
+    Calibrated = AidedCalibration | CalibrationFromSections
 
 
 def in_order(settings: ImuSettings) -> bool:
@@ -60,7 +59,7 @@ def calibrate(
 
     Returns
     -------
-    `inercal.systems.imu.multiposition.calibration.MultipositionCalibration`, or that of the method asked for
+    `inercal.systems.imu.sections.outcome.CalibrationFromSections`, or that of the method asked for
         An estimate and the evidence behind it; nothing is raised for a poor fit.
 
     Raises
@@ -105,14 +104,10 @@ def _by_method(
             from inercal.systems.imu.aided.calibration import calibrate_aided
 
             return calibrate_aided(record, settings, settings.method, progress)
-        case SectionsSettings() | MeansSettings() | KnownRatesSettings() | KnownTurnsSettings():
+        case SectionsSettings() | MeansSettings() | KnownRatesSettings() | KnownTurnsSettings() | None:
             from inercal.systems.imu.sections.outcome import calibrate_from_sections
 
             return calibrate_from_sections(records, settings, settings.method, progress)
-        case None:
-            from inercal.systems.imu.multiposition.calibration import calibrate_multiposition
-
-            return calibrate_multiposition(record, settings, progress)
 
 
 def _with_exact_clock(calibration: Calibrated, typed: bool) -> Calibrated:

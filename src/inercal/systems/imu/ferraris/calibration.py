@@ -31,9 +31,9 @@ from inercal.systems.imu.sections.outcome import (
     MODEL,
     REFERENCES,
     CalibrationFromSections,
-    by_file,
     of_proposal,
 )
+from inercal.systems.imu.sections.recordings import by_file
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.settings import COMMAND, MASKED, FerrarisSettings, ImuSettings
 

@@ -11,7 +11,7 @@ from inercal.systems.imu.rows import is_counted
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import stated_rows, table_text
 from inercal.systems.imu.sections.cutting.words import claim
-from inercal.systems.imu.sections.outcome import by_file, refuse_samples
+from inercal.systems.imu.sections.recordings import by_file, refuse_samples
 from inercal.systems.imu.settings import ImuSettings, MeansSettings, SectionsSettings
 
 

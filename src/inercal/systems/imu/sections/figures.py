@@ -1,4 +1,5 @@
-"""The figures of a calibration from sections: coefficients, what is left of each section, correlation and budget."""
+"""The figures of a calibration from sections: its holds, coefficients, what is left of each section, correlation and
+budget."""
 
 from __future__ import annotations
 
@@ -7,11 +8,13 @@ from numpy.typing import NDArray
 
 from inercal.faces.report.coefficients import budget, correlation, values
 from inercal.faces.report.html import Picture
-from inercal.faces.report.marks import Axis, Dots, Level, Mark, Panel
+from inercal.faces.report.marks import Axis, Dots, Level, Line, Mark, Panel, Strips
 from inercal.faces.report.panels import draw
 from inercal.faces.report.sphere import hemispheres
-from inercal.faces.report.style import COLOURS
+from inercal.faces.report.style import ALARM, COLOURS, envelope
 from inercal.systems.imu.sections.calibration import SectionCalibration
+from inercal.systems.imu.sections.cutting.limits import LIMITS
+from inercal.systems.imu.sections.cutting.windows import Windows
 from inercal.systems.imu.sections.design import DesignedSections
 from inercal.systems.imu.sections.outcome import CalibrationFromSections
 
@@ -19,10 +22,12 @@ from inercal.systems.imu.sections.outcome import CalibrationFromSections
 def pictures(calibration: CalibrationFromSections) -> list[Picture]:
     """Draw what there is to see of a calibration of any status; nothing where there was no fit."""
     estimate, found = calibration.estimate, calibration.found
+    holds = _holds(calibration)
     if found is None:
         swung = bool(estimate.names)
-        return [values(estimate), correlation(estimate), budget(estimate)] if swung else []
-    return [*_directions(found), _left(found), values(estimate), correlation(estimate), budget(estimate)]
+        return [*holds, *([values(estimate), correlation(estimate), budget(estimate)] if swung else [])]
+    drawn = [*_directions(found), _left(found), values(estimate), *holds]
+    return [*drawn, correlation(estimate), budget(estimate)]
 
 
 def _directions(found: SectionCalibration) -> list[Picture]:
@@ -46,6 +51,44 @@ def _directions(found: SectionCalibration) -> list[Picture]:
             "at 30° and 60° from the pole), numbered in their order; near ones share a label.",
             [hemispheres(ways)],
             3.3,
+        )
+    ]
+
+
+def _holds(calibration: CalibrationFromSections) -> list[Picture]:
+    """Scatter of the outputs of one log in short windows, with the holds that are used and those that are not."""
+    proposal = calibration.proposal
+    rests = [] if proposal is None else [row for row in proposal.rows if row.kind == "rest"]
+    if proposal is None or len(proposal.triads) != 1 or not all(row.end for row in rests) or not rests:
+        return []
+    used = [(row.begin or 0.0, row.end or 0.0) for row in rests if row.section not in proposal.unused]
+    unused = [
+        (float(item["begin [s]"]), float(item["end [s]"]))
+        for finding in calibration.estimate.findings
+        for item in finding.items
+        if finding.code == "poor_section" and "begin [s]" in item
+    ]
+    panels: list[list[Panel]] = []
+    (triads,) = proposal.triads.values()
+    for name, triad in zip(("accelerometers", "gyro"), triads, strict=True):
+        if triad is None or len(triad.t) < 4 * LIMITS.blocks_of_window:
+            continue
+        block = max(round(LIMITS.still_window / LIMITS.blocks_of_window / triad.step), 2)
+        windows = Windows.of(triad.values, block, np.zeros(0, dtype=np.int64))
+        size = np.sqrt(np.where(np.isfinite(windows.variance), windows.variance, np.nan))
+        marks: list[Mark] = [
+            Strips(used, COLOURS[2], 0.25),
+            *([Strips(unused, ALARM, 0.25)] if unused else []),
+            Line(*envelope(triad.t[: len(size) * block : block], size), width=0.5),
+        ]
+        panels.append([Panel(marks, Axis("time [s]", margin=0.005), Axis(f"{name}\n[output]", "log"))])
+    return [
+        draw(
+            "Holds",
+            f"Scatter of the outputs in windows of {LIMITS.still_window:g} s. Shaded: the {len(used)} holds that are "
+            f"used, and in red the {len(unused)} that are not.",
+            panels,
+            0.6 + 1.5 * len(panels),
         )
     ]
 

@@ -140,6 +140,8 @@ class Limits:
     open_scale: float = 0.5
     """Relative standard deviation of a scale of the gyro that nothing but moves tells."""
 
+    harmless_wander: float = 0.3
+    """Angle by which a bias off its mean turns moves, over their scatter, up to which it is left to that."""
     turned_vertical: float = math.radians(10.0)
     """Angle [rad] between the verticals of two rests from which a gyro has to see a motion between them."""
 

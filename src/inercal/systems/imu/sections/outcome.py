@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -17,24 +16,26 @@ from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Finding, Status
 from inercal.foundation.instruments.terms import TERMS
 from inercal.foundation.records.column import Triad
+from inercal.foundation.records.places import counted
 from inercal.foundation.records.record import Record, recorded_temperature
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, Uncertainty
 from inercal.foundation.results.result import Estimate, timed
 from inercal.foundation.units import RAW, Quantity
-from inercal.systems.imu.limits import LIMITS as IMU_LIMITS
-from inercal.systems.imu.rows import is_counted, rows_of
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
 from inercal.systems.imu.sections.clocks import two_clocks
 from inercal.systems.imu.sections.cutting.between import SwingStretch
+from inercal.systems.imu.sections.cutting.by_hand import by_hand
 from inercal.systems.imu.sections.cutting.limits import LIMITS as CUTTING
 from inercal.systems.imu.sections.cutting.proposal import Proposal
 from inercal.systems.imu.sections.cutting.table import stated_rows
 from inercal.systems.imu.sections.findings import findings_of, verdict
 from inercal.systems.imu.sections.missing import missing
-from inercal.systems.imu.sections.move_findings import findings_of_moves
+from inercal.systems.imu.sections.move_findings import findings_of_moves, of_channels
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.readings import side_by_side
+from inercal.systems.imu.sections.recordings import by_file, findings_of_records, refuse_samples, unit_of
+from inercal.systems.imu.sections.resolution import resolution_finding, with_resolution
 from inercal.systems.imu.sections.section import Section
 from inercal.systems.imu.sections.shorthands import (
     Shorthand,
@@ -44,9 +45,16 @@ from inercal.systems.imu.sections.shorthands import (
     word_of,
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
-from inercal.systems.imu.sections.tables import budget_item, of_moves, of_sections, relative_alignment
+from inercal.systems.imu.sections.tables import (
+    budget_item,
+    of_moves,
+    of_poses,
+    of_sections,
+    of_turns,
+    relative_alignment,
+)
 from inercal.systems.imu.sections.with_moves import calibrate_with_moves
-from inercal.systems.imu.settings import COMMAND, MASKED, ImuSettings, SectionsSettings
+from inercal.systems.imu.settings import COMMAND, ImuSettings, SectionsSettings
 
 MODEL = Formula(
     r"Accelerometers $y = K_0 + K_1 (l + K_2 l^2)$, $l = M f$; gyro $y = D_F + S T \omega + G f$, mean outputs of "
@@ -64,20 +72,23 @@ _OF_GYRO = "z along the input axis of gyro z, y in the plane of the input axes o
 @short_repr
 @dataclass(frozen=True, eq=False)
 class CalibrationFromSections:
-    """An ``estimate``, the ``sections`` that were read, and the calibration ``found``, if any."""
+    """An ``estimate``, the ``sections`` that were read, and, where there was a fit, the calibration ``found`` and the
+    ``proposal`` with the recordings."""
 
     estimate: Estimate
     sections: tuple[Section, ...]
     found: SectionCalibration | None = None
+    proposal: Proposal | None = None
 
 
 def calibrate_from_sections(
     records: Sequence[Record],
     settings: ImuSettings,
-    options: SectionsSettings | Shorthand,
+    options: SectionsSettings | Shorthand | None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> CalibrationFromSections:
-    """Calibrate from the sections that a study states, that names and recordings tell, or that a shorthand stands for.
+    """Calibrate from the sections that a study states, that names and recordings tell, or that a shorthand stands for;
+    without ``options`` from the poses of one log in the hand and the moves between them.
 
     Raises
     ------
@@ -87,7 +98,12 @@ def calibrate_from_sections(
     clock = time.perf_counter()
     progress("reading the sections")
     named, temperature = by_file(records), recorded_temperature(records[0])
-    if isinstance(options, SectionsSettings):
+    if options is None:
+        ((name, record),) = named.items()
+        proposal = by_hand(name, record, settings)
+        found = of_proposal(proposal, [record], settings, temperature=temperature, progress=progress)
+        found = _said(found, {"method": "multiposition", **_of_hand(found)})
+    elif isinstance(options, SectionsSettings):
         refuse_samples(named)
         found = of_proposal(
             _proposal(named, options), records, settings, options, temperature=temperature, progress=progress
@@ -99,9 +115,22 @@ def calibrate_from_sections(
         proposal = replace(proposal, notes=(*proposal.notes, *gyro_of_means(records, options)))
         kept = list(named.values())
         found = of_proposal(proposal, kept, settings, temperature=temperature, progress=progress)
-        result = {**found.estimate.result, "method": word_of(options)}
-        found = replace(found, estimate=replace(found.estimate, result=result))
+        found = _said(found, {"method": word_of(options)})
     return replace(found, estimate=timed(found.estimate, clock))
+
+
+def _said(calibration: CalibrationFromSections, more: Mapping[str, Any]) -> CalibrationFromSections:
+    """The calibration with more in its result."""
+    result = {**calibration.estimate.result, **more}
+    return replace(calibration, estimate=replace(calibration.estimate, result=result))
+
+
+def _of_hand(calibration: CalibrationFromSections) -> Mapping[str, Any]:
+    """Tables of the poses and turns of a hand; none where there was no fit."""
+    found, proposal = calibration.found, calibration.proposal
+    if found is None or proposal is None:
+        return {}
+    return {"intervals": of_poses(found, proposal), "turns": of_turns(found)}
 
 
 def of_proposal(
@@ -119,9 +148,9 @@ def of_proposal(
 
     Raises `InputError` for recordings in several units, and for a frame that no section tells.
     """
-    units = {sensor: _unit(sensor, records) for sensor in ("acc", "gyro")}
+    units = {sensor: unit_of(sensor, records) for sensor in ("acc", "gyro")}
     sections = tuple(placed(section, options) for section in proposal.sections)
-    findings = (*_of_records(records), *proposal.questions, *proposal.notes)
+    findings = (*findings_of_records(records), *proposal.questions, *proposal.notes)
     sources = [source for record in records for source in record.sources]
 
     def without(status: Status, text: str) -> CalibrationFromSections:
@@ -148,23 +177,40 @@ def of_proposal(
             "imu.frame",
             "found case, but no section says a direction or axis, expected accelerometers, or none",
         )
-    lacking = missing(sections, priors)
+    if proposal.numbered:  # a bias that wanders from pose to pose is more than noise
+        priors = replace(priors, excess=frozenset({"gyro"}))
+    # moves tell the scale of the gyro
+    lacking = missing([replace(s, gyro=None) for s in sections] if proposal.moves else sections, priors)
     if lacking is not None:
         what = ", ".join(lacking.terms)
         return without(Status.UNOBSERVABLE, f"the sections leave {what} open: add {lacking.cure}")
     progress("fitting the sections")
+    used = 0
     try:
         if proposal.moves:
             moved = calibrate_with_moves(sections, [one.move for one in proposal.moves], priors)
-            found, findings = moved.calibration, (*findings, *findings_of_moves(moved, proposal.moves))
+            found, asked = moved.calibration, of_channels(moved)
+            findings = (
+                *findings,
+                *asked,
+                *findings_of_moves(moved, proposal.moves, numbered=proposal.numbered),
+            )
+            proposal = replace(proposal, questions=(*proposal.questions, *asked))
+            used = len(moved.used)
         else:
             found = calibrate_sections(sections, priors)
     except LinAlgError:
         text = "the sections leave some combination of coefficients open: add rests on all six sides"
         return without(Status.UNOBSERVABLE, text)
     findings = (*findings, *findings_of(found, priors), *two_clocks(found, by_file(records)))
-    estimate = _estimate(found, settings, records, units, proposal, findings, temperature)
-    return CalibrationFromSections(estimate, sections, found)
+    if proposal.numbered:
+        found = replace(found, excess=found.excess - {"gyro"})
+    if units["gyro"] is not None:
+        steps = np.array(proposal.steps)
+        found = with_resolution(found, steps)
+        findings = (*findings, *resolution_finding(steps, units["gyro"].unit.symbol))
+    estimate = _estimate(found, settings, records, units, proposal, findings, temperature, used)
+    return CalibrationFromSections(estimate, sections, found, proposal)
 
 
 def stated_priors(settings: ImuSettings, scales: Mapping[str, Size | None]) -> Priors:
@@ -241,49 +287,6 @@ def _by_swing(
     )
 
 
-def by_file(records: Sequence[Record]) -> dict[str, Record]:
-    """The records by the names of their files."""
-    named: dict[str, Record] = {}
-    for record in records:
-        name = PurePath(record.sources[0].path).name if record.sources else "recording"
-        named[name if name not in named else f"{name} ({len(named) + 1})"] = record
-    return named
-
-
-def _unit(sensor: str, records: Sequence[Record]) -> Triad | None:
-    """A triad of the records, which tells the unit of all; None where there is none."""
-    triads = [
-        record.triad(sensor) for record in records if all(f"{sensor}_{axis}" in record for axis in "xyz")
-    ]
-    symbols = {triad.unit.symbol for triad in triads}
-    if len(symbols) > 1:
-        raise RecordError(
-            triads[-1].source.path,
-            f"found {sensor} in {' and '.join(sorted(symbols))}, expected one unit in all files",
-        )
-    return triads[0] if triads else None
-
-
-def refuse_samples(named: Mapping[str, Record]) -> None:
-    """Refuse rows without times that are samples of a recording: most of many are like the one before.
-
-    Raises `RecordError`.
-    """
-    for name, record in named.items():
-        sensor = "acc" if "acc_x" in record else "gyro"
-        if not is_counted(record) or f"{sensor}_z" not in record:
-            continue
-        values = record.triad(sensor).values
-        size = max(float(np.nanmax(np.ptp(values, axis=0))), float(np.nanmax(np.abs(values))))
-        alike = np.linalg.norm(np.diff(values, axis=0), axis=1) < 10.0 * IMU_LIMITS.same_pose * size
-        if len(values) > IMU_LIMITS.most_poses and np.mean(alike) > 0.5:
-            raise RecordError(
-                name,
-                f"found {len(values)} rows, most of them like the one before, expected one row for each pose, or of "
-                'a recording a time column t and imu.method = "sections"',
-            )
-
-
 def _scale(triad: Triad | None) -> Size | None:
     """The scale factors of physical outputs beforehand; None in counts."""
     return None if triad is None or triad.unit.dimension in RAW else Size(1.0 / triad.unit.factor, 0.05)
@@ -306,17 +309,6 @@ def placed(section: Section, options: SectionsSettings) -> Section:
     )
 
 
-def _of_records(records: Sequence[Record]) -> tuple[Finding, ...]:
-    """Findings about the recordings; those about time do not hold for rows of means."""
-    found: dict[Finding, None] = {}
-    for record in records:
-        counted = is_counted(record)
-        sensor = "acc" if "acc_x" in record else "gyro"
-        for finding in rows_of(record, sensor)[2] if counted else record.findings:
-            found[replace(finding, harm=()) if finding.code in MASKED else finding] = None
-    return tuple(found)
-
-
 def _estimate(
     found: SectionCalibration,
     settings: ImuSettings,
@@ -325,8 +317,9 @@ def _estimate(
     proposal: Proposal,
     findings: Sequence[Finding],
     temperature: Quantity | None,
+    moves: int,
 ) -> Estimate:
-    """Put the estimate together."""
+    """Put the estimate together; so many ``moves`` were used."""
     triads = {sensor: triad for sensor, triad in units.items() if triad is not None}
     symbols = {sensor: triad.unit.symbol for sensor, triad in triads.items()}
     g, readings = settings.site.gravity, found.problem.readings
@@ -351,13 +344,14 @@ def _estimate(
         ],
         found.x,
         Uncertainty(found.covariance, found.dof, budget),
-        verdict(found, proposal.questions),
+        _verdict(found, proposal, moves),
         findings=findings,
         statistics={
             "dof": found.freedom,
             "chi2": found.chi2,
             "probability": found.probability,
             "intervals": float(len(readings.sections)),
+            **({"turns": float(moves)} if moves else {}),
         },
         result={
             "method": "sections",
@@ -369,3 +363,16 @@ def _estimate(
             "unit": symbols,
         },
     )
+
+
+def _verdict(found: SectionCalibration, proposal: Proposal, moves: int) -> tuple[Status, str]:
+    """Status and message, in which moves count as well."""
+    status, message = verdict(found, proposal.questions)
+    if status is not Status.OK or not proposal.moves:
+        return status, message
+    if not moves:
+        return (
+            Status.TOO_FEW_INTERVALS,
+            f"{message}; no move between them can be used, so that the gyro is not calibrated: see the findings",
+        )
+    return status, f"{message} and {counted(moves, 'move')}"

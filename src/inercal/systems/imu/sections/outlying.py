@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -62,6 +62,19 @@ def outlying_of(found: SectionCalibration) -> tuple[Outlying, ...]:
         out.append(Outlying(_KINDS[worst.block], worst.cell, worst.probability * items, worst.sigmas))
         linear, z = linear.without(worst.cell, worst.block), worst.z
     return tuple(out)
+
+
+def shifts_of(found: SectionCalibration, outlying: Sequence[Outlying]) -> dict[str, float]:
+    """Changes of the coefficients by name where all these are left out, in their u then."""
+    linear = Linear(found.problem, found.point.x, rows(found.problem, found.point))
+    start = np.log([found.scatter[name] for name in found.problem.sizes])
+    here = linear.at(mode(linear, start)[0])
+    for one in outlying:
+        linear = linear.without(one.place, _KINDS.index(one.kind))
+    without = linear.at(mode(linear, start)[0])
+    count = len(found.names)
+    shift = (without.shared - here.shared)[:count] / np.sqrt(np.diag(without.covariance)[:count])
+    return dict(zip(found.names, shift.tolist(), strict=True))
 
 
 def _suspects(linear: Linear, z: Array) -> Iterator[tuple[int, int]]:

@@ -39,6 +39,7 @@ from inercal.systems.imu.sections.unknowns import (
     Values,
     across,
     cross,
+    level_axes,
     matrix,
     turned,
 )
@@ -212,7 +213,7 @@ def centred(problem: Problem, point: Iterate) -> Iterate:
         gain = x[K1][:, None] * matrix(x[M])
         felt = (r.y[r.led, 0] - x[K0]) @ np.linalg.inv(gain).T
         up[r.led] = felt / np.linalg.norm(felt, axis=1, keepdims=True)
-    level = np.concatenate([across(up), up[:, :, None]], axis=2)
+    level = level_axes(up)
     out = replace(point, x=x, up=up, axis=axis, level=level)
     for extra in problem.extras:
         out = extra.centred(problem, out)

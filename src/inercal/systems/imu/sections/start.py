@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from inercal.foundation.arrays import Array
 from inercal.systems.imu.sections.problem import Iterate, Problem
-from inercal.systems.imu.sections.unknowns import D_F, K0, K1, S, across
+from inercal.systems.imu.sections.unknowns import D_F, K0, K1, S, level_axes
 
 
 def first_guess(problem: Problem) -> Iterate:
@@ -67,9 +66,4 @@ def first_guess(problem: Problem) -> Iterate:
         base[unknown] = base[r.leader[unknown]]
     unsaid = r.tied & ~r.know_axis & ~r.forced
     up[unsaid] = axis[unsaid] * np.where(np.sum(up * axis, axis=1) < 0.0, -1.0, 1.0)[unsaid, None]
-    return Iterate(x, up, axis, _level(up), np.zeros((n, 2)), np.zeros((n, 2)))
-
-
-def _level(up: Array) -> Array:
-    """Axes of earth rate (n, 3, 3) in columns: two across the vertical, and that."""
-    return np.concatenate([across(up), up[:, :, None]], axis=2)
+    return Iterate(x, up, axis, level_axes(up), np.zeros((n, 2)), np.zeros((n, 2)))

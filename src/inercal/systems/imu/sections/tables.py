@@ -1,4 +1,4 @@
-"""Tables of the result of a calibration from sections: sections, moves, alignment, the budget."""
+"""Tables of the result of a calibration from sections: sections, moves, the budget, and poses and turns of a hand."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from inercal.foundation.results.budget import BudgetItem
 from inercal.systems.imu.sections.calibration import SectionCalibration
 from inercal.systems.imu.sections.cutting.proposal import Proposal
+from inercal.systems.imu.sections.moves import MoveRows
+from inercal.systems.imu.sections.with_moves import verticals_of
 
 
 def of_moves(proposal: Proposal) -> list[Mapping[str, Any]]:
@@ -67,4 +69,41 @@ def of_sections(found: SectionCalibration) -> list[Mapping[str, Any]]:
                 row[f"{sensor}_residual"] = float(np.sqrt(np.mean(found.residuals[k, kind][seen] ** 2)))
         row["off_its_place_rad"] = float(found.placed[k].max())
         rows.append(row)
+    return rows
+
+
+def of_poses(found: SectionCalibration, proposal: Proposal) -> list[Mapping[str, Any]]:
+    """One row for each pose of a hand: its times, its direction, and what the fit leaves of the size of its force."""
+    up, rows = verticals_of(found), {row.section: row for row in proposal.rows}
+    scale = np.array([found.value(f"K1_{axis}")[0] for axis in "xyz"])
+    left = np.sum(found.residuals[:, 0] / scale * up, axis=1)
+    return [
+        {
+            "pose": int(section.name.split()[1]),
+            "start_s": rows[section.name].begin,
+            "end_s": rows[section.name].end,
+            "direction": direction,
+            "residual_m_s2": float(residual),
+        }
+        for section, direction, residual in zip(found.problem.readings.sections, up, left, strict=True)
+        if section.acc is not None
+    ]
+
+
+def of_turns(found: SectionCalibration) -> list[Mapping[str, Any]]:
+    """One row for each move between poses that counts: its times, and the angle by which it misses the next pose."""
+    rows: list[Mapping[str, Any]] = []
+    sections = found.problem.readings.sections
+    for extra in found.problem.extras:
+        assert isinstance(extra, MoveRows)
+        (block,) = extra.blocks(found.problem, found.point)
+        for move, miss in zip(extra.moves, np.linalg.norm(block.residual[:, :2], axis=1), strict=True):
+            rows.append(
+                {
+                    "from_pose": int(sections[move.first].name.split()[1]),
+                    "start_s": float(move.t[0]),
+                    "duration_s": move.duration,
+                    "miss_rad": float(miss),
+                }
+            )
     return rows

@@ -84,3 +84,10 @@ def across(u: Array) -> Array:
     first = cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, cross(u, first)], axis=2)
+
+
+def level_axes(up: Array) -> Array:
+    """Axes of earth rate (n, 3, 3) in columns: two across the vertical ``up`` (n, 3), and that. All are right-handed,
+    so that the level part of earth rate can be carried from one to the next."""
+    first = across(up)[:, :, 0]
+    return np.stack([first, cross(up, first), up], axis=2)

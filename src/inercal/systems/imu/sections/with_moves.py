@@ -16,13 +16,14 @@ from inercal.foundation.arrays import Array, short_repr
 from inercal.foundation.records.checks.values import at_ends
 from inercal.systems.imu.limits import LIMITS as OF_ALL
 from inercal.systems.imu.sections.calibration import SectionCalibration, calibrate_sections
-from inercal.systems.imu.sections.carried import Increments, Move, increments, net_rotations
+from inercal.systems.imu.sections.carried import Move
+from inercal.systems.imu.sections.gyro_axes import ChannelOrder, CoarseMoves
 from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.moves import MoveRows, move_rows
 from inercal.systems.imu.sections.outputs import effective, verticals
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.unknowns import COMMON
+from inercal.systems.imu.sections.unknowns import COMMON, S
 
 
 class MoveLeftOut(NamedTuple):
@@ -47,6 +48,8 @@ class CalibrationWithMoves:
     """Terms, or the scatter, of the accelerometers that moves made worse, for which these have no say in them."""
     rescaled: bool
     """True where moves deny the scale that was said of the gyro."""
+    channels: ChannelOrder | None = None
+    """Axes that the channels of the gyro seem to measure, where no scale carries the verticals: no fit was made."""
 
 
 def calibrate_with_moves(
@@ -69,11 +72,23 @@ def calibrate_with_moves(
     used = tuple(k for k in range(len(moves)) if k not in {one.move for one in left_out})
     kept = [moves[k] for k in used]
     if not kept:
-        joint = calibrate_sections(sections, priors)
+        no_scale = priors.gyro_scale is None and not _turned(sections)
+        joint = alone if no_scale else calibrate_sections(sections, priors)
         return CalibrationWithMoves(joint, alone, used, left_out, (), rescaled=False)
-    scaled, rescaled = _scaled(sections, kept, priors, alone)
+    scaled, rescaled, channels = _scaled(sections, kept, priors, alone)
+    if channels is not None:
+        return CalibrationWithMoves(alone, alone, (), left_out, (), rescaled=False, channels=channels)
+    scaled = replace(scaled, excess=scaled.excess | alone.excess)
     extra = move_rows(len(sections), kept, scaled)
     joint = calibrate_sections(sections, scaled, (extra,))
+    wander = _wander(joint, extra)
+    if wander is not None:
+        less = move_rows(len(sections), [_less(move, wander) for move in kept], scaled)
+        without = calibrate_sections(sections, scaled, (less,))
+        chance = 1.0 / np.sqrt(2.0 * max(joint.scatter_dof["moves"], 1.0))
+        gained = np.log(joint.scatter["moves"] / without.scatter["moves"])
+        if without.converged and gained > LIMITS.raised_scatter * chance:  # else rests are restless, no bias
+            joint, extra = without, less
     spoiled = _spoiled(alone, joint)
     if spoiled:
         joint = _without_say(sections, scaled, extra, alone)
@@ -117,7 +132,6 @@ def not_seen(
     )
     cosine = [np.clip(up[move.first] @ up[move.last], -1.0, 1.0) for move in moves]
     angle = np.arccos(cosine)
-    told = any(s.kind != "rest" and s.gyro is not None for s in sections)
     # by the largest sweep, not by the stated unit: a wrong unit makes all of them small, and is named as such
     least = float(np.max(swept)) / LIMITS.largest_sweep
     missing = (angle > LIMITS.turned_vertical) & (swept < 0.5 * least * angle)
@@ -125,10 +139,19 @@ def not_seen(
         MoveLeftOut(int(k), "the vertical turns and the gyro does not: rows are missing")
         for k in np.flatnonzero(missing)
     ]
-    if priors.gyro_scale is None and not told and not np.any((angle > LIMITS.turned_vertical) & ~missing):
+    if (
+        priors.gyro_scale is None
+        and not _turned(sections)
+        and not np.any((angle > LIMITS.turned_vertical) & ~missing)
+    ):
         open_still = "it turns about the vertical, which leaves the scale of a gyro in counts open"
         out += [MoveLeftOut(int(k), open_still) for k in np.flatnonzero(~missing)]
     return tuple(out)
+
+
+def _turned(sections: Sequence[Section]) -> bool:
+    """True where sections other than rests tell the scale of the gyro."""
+    return any(s.kind != "rest" and s.gyro is not None for s in sections)
 
 
 def _rest_bias(sections: Sequence[Section]) -> Array:
@@ -141,31 +164,21 @@ def _rest_bias(sections: Sequence[Section]) -> Array:
 
 def _scaled(
     sections: Sequence[Section], moves: Sequence[Move], priors: Priors, alone: SectionCalibration
-) -> tuple[Priors, bool]:
-    """The priors with a scale of the gyro that carries the verticals of rests, and whether what was said of it does
-    not. A scale that other sections tell needs no guess."""
-    if any(s.kind != "rest" and s.gyro is not None for s in sections):
-        return priors, False
+) -> tuple[Priors, bool, ChannelOrder | None]:
+    """The priors with a scale of the gyro that carries the verticals of rests, whether what was said of it does not,
+    and the order of its channels where no scale does. A scale that other sections tell needs no guess."""
+    if _turned(sections):
+        return priors, False, None
     said = priors.gyro_scale
-    up = verticals_of(alone)
-    coarse = _thinned(increments(moves))
-    raw = coarse.gyro - coarse.dt[..., None] * _rest_bias(sections)
-    ends = np.array([(move.first, move.last) for move in moves])
-
-    def missed(scale: float) -> float:
-        R = net_rotations(raw / scale)
-        carried = np.einsum("mji,mj->mi", R, up[ends[:, 0]])
-        return float(np.sqrt(np.median(np.sum((carried - up[ends[:, 1]]) ** 2, axis=1))))
-
-    if said is not None and missed(said.median) < OF_ALL.vertical_miss:
-        return priors, False
-    swept = max(float(np.median(np.sum(np.linalg.norm(raw, axis=-1), axis=0))), 1e-300)
-    scales = swept / np.geomspace(LIMITS.least_sweep, LIMITS.largest_sweep, 62)
-    misses = [missed(scale) for scale in scales]
-    best = int(np.argmin(misses))
-    if said is not None and misses[best] > OF_ALL.vertical_miss:
-        return priors, False
-    return replace(priors, gyro_scale=Size(float(scales[best]), LIMITS.open_scale)), said is not None
+    coarse = CoarseMoves.of(moves, verticals_of(alone), _rest_bias(sections))
+    if said is not None and coarse.missed(said.median) < OF_ALL.vertical_miss:
+        return priors, False, None
+    best = coarse.best()
+    if best.miss > OF_ALL.vertical_miss and len(moves) >= OF_ALL.fewest_turns:
+        return priors, False, coarse.order(best.miss)
+    if said is not None and best.miss > OF_ALL.vertical_miss:
+        return priors, False, None
+    return replace(priors, gyro_scale=Size(best.scale, LIMITS.open_scale)), said is not None, None
 
 
 def verticals_of(found: SectionCalibration) -> Array:
@@ -174,15 +187,31 @@ def verticals_of(found: SectionCalibration) -> Array:
     return np.asarray(verticals(found.problem, found.point, x[:COMMON], effective(found.problem, x)).real)
 
 
-def _thinned(moved: Increments) -> Increments:
-    """Increments in at most some 80 intervals, for a first guess."""
-    length = max(1, len(moved.dt) // 80)
-    pad = -len(moved.dt) % length
-    dt, gyro, acc = (
-        np.pad(x, [(0, pad)] + [(0, 0)] * (x.ndim - 1)).reshape(-1, length, *x.shape[1:]).sum(axis=1)
-        for x in (moved.dt, moved.gyro, moved.acc)
-    )
-    return Increments(dt, gyro, acc)
+def _wander(found: SectionCalibration, extra: MoveRows) -> Array | None:
+    """Distance of the bias of the gyro from its mean in each rest (n, 3) [output], as far as it is more than noise;
+    None where that hardly turns a move.
+
+    A bias that drifts is that of the rests beside a move, not their mean: their residuals, less the part of them that
+    is noise.
+    """
+    scatter = found.scatter.get("gyro", 0.0) * np.abs(found.point.x[S])
+    variance = found.problem.readings.variance[:, 2]
+    if not np.any(scatter > 0.0):
+        return None
+    wander = np.where(found.problem.readings.seen[:, 2], found.residuals[:, 2], 0.0)
+    wander = wander * scatter**2 / (scatter**2 + variance)
+    first, last = extra.ends
+    tau = extra.increments.durations
+    turned = 0.5 * (wander[first] + wander[last]) / found.point.x[S] * tau[:, None]
+    usual = found.scatter["moves"] * np.sqrt(tau)
+    off = float(np.sqrt(np.mean(np.sum(turned**2, axis=1)) / np.mean(usual**2)))
+    return np.asarray(wander) if off > LIMITS.harmless_wander else None
+
+
+def _less(move: Move, wander: Array) -> Move:
+    """A move without the bias that the rests beside it have beyond the mean (n, 3), which changes evenly in it."""
+    part = ((move.t - move.t[0]) / move.duration)[:, None]
+    return replace(move, gyro=move.gyro - (1.0 - part) * wander[move.first] - part * wander[move.last])
 
 
 def _spoiled(alone: SectionCalibration, joint: SectionCalibration) -> tuple[str, ...]:

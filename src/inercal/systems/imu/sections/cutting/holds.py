@@ -1,7 +1,7 @@
 """Holds of a recording: where the instrument stands still, for accelerometers and for gyros each by their own evidence.
 
 The variance in windows of 0.4 s has two humps on a logarithmic scale, of rest and of motion; still is what lies below
-the valley between them. Of several valleys (table, hand, motion) the one is taken that gives most poses in sound holds.
+the valley between them. Of several valleys (table, hand, motion) the one is taken whose poses fix most (`choice`).
 Each hold is grown to where it stops being still, and judged: by the drift of its outputs, and by the mean of the gyro
 against that of the others, for a smooth turn about the vertical leaves the accelerometers as they are.
 """
@@ -9,12 +9,13 @@ against that of the others, for a smooth turn about the vertical leaves the acce
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.records.dwells import Dwell, breaks
+from inercal.systems.imu.sections.cutting.choice import HoldSet, best
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.windows import Places, Windows, valleys
 
@@ -36,6 +37,19 @@ class Holds:
     gyro: tuple[Dwell, ...]
     unused: tuple[UnusedHold, ...]
     calmest: int = 0
+
+    @property
+    def rests(self) -> tuple[Dwell, ...]:
+        """Holds of the accelerometers without the begin and end of motions, which the gyro sees first: their means and
+        the moves between them need all of the motion outside. In a restless hand one stays as it is."""
+        return tuple(_still_for_both(hold, self.gyro) for hold in self.acc)
+
+
+def _still_for_both(hold: Dwell, of_gyro: Sequence[Dwell]) -> Dwell:
+    """A hold as far as the gyro rests in it, where that is most of it."""
+    both = [replace(one, start=max(one.start, hold.start), stop=min(one.stop, hold.stop)) for one in of_gyro]
+    longest = max(both, key=lambda one: one.samples, default=hold)
+    return longest if longest.samples > LIMITS.still_for_both * hold.samples else hold
 
 
 @np.errstate(divide="ignore", invalid="ignore")  # what is not finite is no hold
@@ -70,7 +84,12 @@ def holds_of(t: Array, acc: Array | None, gyro: Array | None) -> Holds:
             for level in windows.levels(cap)
             for gate in sorted({*(max(gate, harmless) for gate in gates), np.inf})
         ]
-        held = _best([(gate, stretches, *windows.poses(stretches)) for gate, stretches in sets])
+        noise = float(np.sqrt(np.nanmin(windows.variance) / block)) / max(windows.gravity, 1e-300)
+        held = best(
+            [HoldSet(gate, stretches, windows.poses(stretches)) for gate, stretches in sets],
+            max(windows.gravity, 1e-300),
+            noise,
+        )
     if turning is not None and unrest is not None:
         rests = [turning.stretches(unrest[0] + unrest[1] < gate, shortest) for gate in gates or [np.inf]]
         resting = max(rests, key=len)
@@ -134,21 +153,6 @@ def _block(t: Array) -> int:
 def _cuts(t: Array) -> Places:
     """Rows before which time breaks."""
     return breaks(t, 0.5 * LIMITS.still_window + 3.0 * _step(t))
-
-
-def _best(sets: Sequence[tuple[float, list[Dwell], int, int]]) -> list[Dwell]:
-    """The best of sets of holds, from the calmest on, each with its gate, its poses and its blocks.
-
-    Most poses first; then the least turning that gives them; then the calmest that keeps most of the time, for slow
-    motions add time as well.
-    """
-    most = max(poses for _, _, poses, _ in sets)
-    gate = min(gate for gate, _, poses, _ in sets if poses == most)
-    left = [
-        (blocks, stretches) for turning, stretches, poses, blocks in sets if (turning, poses) == (gate, most)
-    ]
-    longest = max(blocks for blocks, _ in left)
-    return next(stretches for blocks, stretches in left if blocks >= LIMITS.kept_time * longest)
 
 
 def _harmless(windows: Windows, turning: Array, time: float) -> float:

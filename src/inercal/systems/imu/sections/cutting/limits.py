@@ -31,6 +31,20 @@ class Limits:
     kept_time: float = 0.7
     """Part of the time at rest that the calmer of two sets of holds with the same poses keeps at least."""
 
+    gap_of_joint: float = 1.0
+    """Time [s] in the place of a step backward, where two logs were joined."""
+
+    worse_holds: float = 1.05
+    """Standard deviations of the coefficients (geometric mean) by a set of holds, over those by the best, up to which
+    a calmer set is taken."""
+
+    usual_error: float = 0.05
+    """Standard deviation of biases, as a part of gravity, scale factors and misalignments of accelerometers before the
+    data, by which sets of holds are compared."""
+
+    usual_pose_scatter: float = 3e-4
+    """Scatter of poses, as a part of gravity, that counts there as one degree of freedom."""
+
     hump_windows: float = 4.0
     """Windows that the peak of a hump holds at least, within half a power of ten of variance."""
 

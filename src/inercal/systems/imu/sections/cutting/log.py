@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from inercal.foundation.records.dwells import Dwell
 from inercal.foundation.records.places import counted
 from inercal.systems.imu.sections.cutting.checks import direction
 from inercal.systems.imu.sections.cutting.cut import TriadSamples
-from inercal.systems.imu.sections.cutting.holds import UnusedHold, holds_of, steady_rates
+from inercal.systems.imu.sections.cutting.holds import Holds, UnusedHold, holds_of, steady_rates
 from inercal.systems.imu.sections.cutting.limits import LIMITS
 from inercal.systems.imu.sections.cutting.table import SectionRow
 
@@ -30,9 +30,7 @@ def rows_of_log(
     t = clock.t
     rate = None if gyro is None else on_clock(gyro, t)
     found = holds_of(t, None if acc is None else acc.values, rate)
-    holds = found.acc if acc is not None else found.gyro
-    if acc is not None:
-        holds = tuple(_still_for_both(hold, found.gyro) for hold in holds)
+    holds = found.rests if acc is not None else found.gyro
     turning: tuple[Dwell, ...] = ()
     if rate is not None and gyro_scale is not None:
         # a file that never stops turning looks as still as one at rest
@@ -45,7 +43,8 @@ def rows_of_log(
     ]
     if acc is not None:
         rests = with_sides(rests, np.array([hold.of(acc.values).mean(axis=0) for hold in holds]))
-    findings = [_unused(file, t, found.unused, len(holds))] if found.unused else []
+    line = of_holds(file, t, found.unused, rests, {})
+    findings = [] if line is None else [line]
     rows = rests
     if rate is not None:
         # without a rest the output at rate 0 is not known
@@ -58,24 +57,8 @@ def rows_of_log(
         turns, told = _turns(file, t, rate, holds, acc, steady, gyro_scale, sided)
         rows, findings = [*rests, *plateaus, *turns], [*findings, *asked, *told]
     if not rows:
-        findings.append(
-            Finding(
-                "not_at_rest",
-                f"{file} is never held still for {LIMITS.shortest_hold:g} s, calmest at {t[found.calmest]:.1f} s.",
-                file,
-                action="Hold the instrument still in each pose for a second or more.",
-                harm=EVERYTHING,
-            )
-        )
+        findings.append(never_held(file, t, found))
     return sorted(rows, key=lambda row: (row.begin or 0.0, row.kind)), findings
-
-
-def _still_for_both(hold: Dwell, of_gyro: Sequence[Dwell]) -> Dwell:
-    """A hold of the accelerometers without the begin and end of motions, which the gyro sees first: its mean and the
-    moves between holds need all of the motion outside. In a restless hand it stays as it is."""
-    both = [replace(one, start=max(one.start, hold.start), stop=min(one.stop, hold.stop)) for one in of_gyro]
-    longest = max(both, key=lambda one: one.samples, default=hold)
-    return longest if longest.samples > LIMITS.still_for_both * hold.samples else hold
 
 
 def on_clock(samples: TriadSamples, t: Array) -> Array:
@@ -113,19 +96,39 @@ def with_sides(rests: Sequence[SectionRow], means: Array) -> list[SectionRow]:
     return told
 
 
-def _unused(file: str, t: Array, unused: Sequence[UnusedHold], used: int) -> Finding:
-    """The line about holds that are of no use."""
-    are = "is" if len(unused) == 1 else "are"
+def of_holds(
+    file: str,
+    t: Array,
+    unused: Sequence[UnusedHold],
+    rests: Sequence[SectionRow],
+    unread: Mapping[str, str],
+) -> Finding | None:
+    """The line about holds that are of no use: those that are none, and ``rests`` that were not read, by name with the
+    reason; None where all are used."""
+    rows = [(float(t[one.start]), float(t[one.stop - 1]), one.why) for one in unused]
+    rows += [
+        (row.begin or 0.0, row.end or 0.0, unread[row.section]) for row in rests if row.section in unread
+    ]
+    if not rows:
+        return None
     return Finding(
         "poor_section",
-        f"{len(unused)} of {counted(len(unused) + used, 'hold')} of {file} {are} not used.",
+        f"{counted(len(unused) + len(rests), 'hold')} found in {file}, {len(rows)} unused.",
         file,
         (),
         action="Hold the instrument still for a second or more where these poses matter.",
-        items=tuple(
-            {"begin [s]": float(t[one.start]), "end [s]": float(t[one.stop - 1]), "why": one.why}
-            for one in unused
-        ),
+        items=tuple({"begin [s]": a, "end [s]": b, "why": why} for a, b, why in sorted(rows)),
+    )
+
+
+def never_held(file: str, t: Array, found: Holds) -> Finding:
+    """The finding about a log in which nothing is held still."""
+    return Finding(
+        "not_at_rest",
+        f"{file} is never held still for {LIMITS.shortest_hold:g} s, calmest at {t[found.calmest]:.1f} s.",
+        file,
+        action="Hold the instrument still in each pose for a second or more.",
+        harm=EVERYTHING,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -47,6 +47,12 @@ class Proposal:
     """Findings that ask nothing, such as holds of no use."""
     moves: tuple[NamedMove, ...] = ()
     swings: tuple[SwingStretch, ...] = ()
+    triads: Mapping[str, tuple[TriadSamples | None, TriadSamples | None]] = field(default_factory=dict)
+    """Accelerometers and gyro of recordings by name."""
+    steps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Steps of the axes of the gyro that hide its noise at rest [output]; 0 for others."""
+    numbered: bool = False
+    """True of poses in the hand, which a study leaves out by their numbers."""
 
     @staticmethod
     def of(records: Mapping[str, Record], means: Mapping[str, Means] | None = None) -> Proposal:
@@ -142,7 +148,14 @@ class Proposal:
         swings = swings_of(rows, triads)
         won = {one.name: "sections at rest tell more than a swing" for one in swings if sections}
         return Proposal(
-            tuple(rows), tuple(sections), {**unused, **no_moves, **won}, questions, notes, moves, swings
+            tuple(rows),
+            tuple(sections),
+            {**unused, **no_moves, **won},
+            questions,
+            notes,
+            moves,
+            swings,
+            triads,
         )
 
 

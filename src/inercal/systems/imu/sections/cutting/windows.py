@@ -17,6 +17,19 @@ Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
+class PoseMeans:
+    """Means (n, 3) of poses, less that of the recording, and their ``lengths`` (n,) in blocks."""
+
+    means: Array
+    lengths: Array
+
+    @property
+    def blocks(self) -> float:
+        """Blocks of all."""
+        return float(self.lengths.sum())
+
+
+@dataclass(frozen=True, eq=False)
 class Windows:
     """Windows of a triad: variances (m,) summed over axes, infinite where a row is missing or time breaks.
 
@@ -90,10 +103,10 @@ class Windows:
             inside[k : k + len(still)] |= still
         return list(static_intervals(inside, self.breaks, shortest))
 
-    def poses(self, stretches: Sequence[Dwell]) -> tuple[int, int]:
-        """Poses in stretches of blocks that do not drift, and the number of blocks in them."""
+    def poses(self, stretches: Sequence[Dwell]) -> PoseMeans:
+        """Poses in stretches of blocks that do not drift: those in a row with one vertical are one."""
         if not stretches:
-            return 0, 0
+            return PoseMeans(np.zeros((0, 3)), np.zeros(0))
         sums = np.concatenate(
             [np.zeros((1, self.blocks.shape[1])), np.cumsum(np.nan_to_num(self.blocks), axis=0)]
         )
@@ -108,9 +121,15 @@ class Windows:
         noise = (power[stops - 1] - power[starts]) / (stops - starts - 1) / third
         limit = np.maximum((LIMITS.drift_in_hold * self.gravity) ** 2, LIMITS.drift_sigmas**2 * noise)
         sound = ((last - first) ** 2).sum(axis=1) <= limit
-        means = ((sums[stops] - sums[starts]) / (stops - starts)[:, None])[sound]
+        whole, lengths = (sums[stops] - sums[starts])[sound], (stops - starts)[sound].astype(float)
+        means = whole / lengths[:, None]
         moved = np.linalg.norm(np.diff(means, axis=0), axis=1) > LIMITS.same_pose * self.gravity
-        return int(sound.any()) + int(moved.sum()), int((stops - starts)[sound].sum())
+        pose, count = np.concatenate([[0], np.cumsum(moved)]), len(means)
+        if not count:
+            return PoseMeans(np.zeros((0, 3)), np.zeros(0))
+        total = np.bincount(pose, lengths).astype(float)
+        merged = np.stack([np.bincount(pose, x) for x in whole.T], axis=1)
+        return PoseMeans(merged / total[:, None], total)
 
 
 def _sums_of_windows(values: Array) -> Array:
