@@ -96,7 +96,7 @@ def _machine_code() -> tuple[Any, str]:
         return None, "kernels are not compiled"
     module: Any = _kernels
     build = PACKAGE.parents[1] / "kernels"  # of a checkout: its table says what Python calls
-    with suppress(OSError):
+    with suppress(OSError, AttributeError):  # a module of an older build says less of itself
         same = digest(PACKAGE, module.FILES) == module.SOURCES
         if same and (
             not (build / "signatures.json").exists() or digest(build, module.BUILD_FILES) == module.BUILD
