@@ -80,7 +80,7 @@ def python(program, path=entries.SOURCE, **environment):
         env=kept | {"PYTHONPATH": str(path)} | environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=900,  # numba may compile first, on a busy machine
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip(), done.stderr
