@@ -5,7 +5,7 @@
 Writes results.md and results.json, anew after each part, and cost.svg at the end. The long campaigns are not in it but
 for the short ones of `accuracy.py`; each is run alone, as its first lines say: `imu_coverage.py`, `noise_coverage.py`,
 `turntable_coverage.py`, `selfcal_coverage.py`, `selfcal_robustness.py`, `strapdown_coverage.py`, `aoa_bands.py`,
-`aoa_endless.py`, `dialect_files.py`, `faults.py`; so are `long_rows.py`,
+`aoa_endless.py`, `dialect_files.py`, `faults.py`; so are `compiled_kernels.py` (two environments), `long_rows.py`,
 `workbench_speed.py`, and `fleets.py`, `workbench_browser.py`,
 `stream_latency.py` and `live.py`, whose figures are of the clock on the wall.
 """

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import time
+import warnings
 from collections import Counter
 from pathlib import Path
 
@@ -20,7 +21,8 @@ gc.set_threshold(50_000, 20, 20)  # as the commands do
 
 # Compiled kernels, where they are those of these sources, and then nothing else: a call that they were not compiled for
 # fails, here and in the processes that tests start. Otherwise numba compiles kernels as tests call them.
-os.environ.setdefault(CHOICE, way().how)
+with warnings.catch_warnings(action="ignore"):  # that they are stale: the header of the report says so
+    os.environ.setdefault(CHOICE, way().how)
 
 LIMIT = 2.0
 """Processor time that a test may take without the mark `slow` or `campaign` [s], on a machine of `YARDSTICK`."""

@@ -80,7 +80,7 @@ def python(program, path=entries.SOURCE, **environment):
         env=kept | {"PYTHONPATH": str(path)} | environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=900,  # numba may compile first, on a busy machine
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip(), done.stderr
@@ -141,6 +141,24 @@ def test_machine_code_of_another_table_of_what_python_calls_is_stale_too(tiny):
     assert "kernels have changed since" in python("from inercal.room import twice", tiny)[1]
     table.unlink()  # a wheel has none
     assert python(PRINT.format("4.0"), tiny) == ("compiled compiled", "")
+
+
+@pytest.mark.parametrize(
+    ("no_numba", "how_long"),
+    [
+        ("", "takes 5 to 40 s, once"),
+        ("import sys; sys.modules['numba'] = None\n", "minutes in place of a second"),
+    ],
+)
+def test_without_machine_code_a_command_says_how_long_it_takes_and_what_helps(tiny, no_numba, how_long):
+    (tiny / "inercal" / "_kernels.py").unlink()
+    program = no_numba + "from inercal.foundation._jit import compiling\nwith compiling('work', print): pass"
+    said = python(program, tiny, XDG_CACHE_HOME=str(tiny / "cache"))[0]
+    assert said.startswith("kernels are not compiled: ")
+    assert how_long in said
+    assert "`make kernels`" in said
+    if not no_numba:  # kept by the first
+        assert python(program, tiny, XDG_CACHE_HOME=str(tiny / "cache"))[0] == ""
 
 
 def test_the_processes_that_compile_find_what_an_isolated_build_installed(tmp_path, monkeypatch):

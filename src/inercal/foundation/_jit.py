@@ -274,7 +274,7 @@ def compiling(name: str, say: Callable[[str], None]) -> Iterator[None]:
     done = None if folder is None else folder / f"{name}.compiled"
     first = f"{why}: " if why else ""
     if how == "python":
-        say(f"{first}kernels run as plain Python, a hundred times slower; {_HOW_TO}")
+        say(f"{first}kernels run as plain Python, minutes in place of a second; {_HOW_TO}")
     elif how == "numba" and (done is None or not done.exists()):
         say(f"{first}compiling those of this command takes 5 to 40 s, once; {_HOW_TO}")
     yield
