@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import textwrap
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cyclopts import App, CycloptsError, Parameter
@@ -363,7 +362,6 @@ def call(arguments: list[str]) -> int | None:
         if argument == "" or re.fullmatch("--[a-z]+=", argument):
             option = argument.rstrip("=") or before
             raise UsageError(f"the text after {option} is empty, expected a name or a value")
-    arguments = [f"./{word}" if _is_a_file(word) else word for word in arguments]
     kinds = [kind for verb, kind in COMMANDS if kind and verb == (arguments or [""])[0]]
     if kinds and all(word.startswith("-") and word not in ("-h", "--help") for word in arguments[1:]):
         raise UsageError(f"{arguments[0]}: found no kind, expected {' or '.join(kinds)} after it")
@@ -378,11 +376,6 @@ def call(arguments: list[str]) -> int | None:
     except CycloptsError as error:
         raise UsageError(refused(root, error)) from error
     return code
-
-
-def _is_a_file(word: str) -> bool:
-    """True for the name of a file that looks like an option: ``-x.csv``, as a shell makes of ``*.csv``."""
-    return re.fullmatch(r"-[^-=]+\.\w+", word) is not None and Path(word).is_file()
 
 
 def refused(root: App, error: CycloptsError) -> str:
