@@ -137,9 +137,9 @@ class Unit:
         gyro = self.D + self.S * (rate @ self.T.T + force @ self.G.T)
         n = len(acc)
         acc = acc + rng.normal(0, self.acc_noise * math.sqrt(fs / 2), (n, 3))
-        acc = acc + np.cumsum(rng.normal(0, self.acc_walk / math.sqrt(fs), (n, 3)), axis=0)
+        acc = acc + wander(rng, self.acc_walk / math.sqrt(fs), n)
         gyro = gyro + rng.normal(0, self.gyro_noise * math.sqrt(fs / 2), (n, 3))
-        gyro = gyro + np.cumsum(rng.normal(0, self.gyro_walk / math.sqrt(fs), (n, 3)), axis=0)
+        gyro = gyro + wander(rng, self.gyro_walk / math.sqrt(fs), n)
         return rounded(acc / self.acc_size + self.acc_zero, self.acc_step), rounded(
             gyro / self.gyro_size + self.gyro_zero, self.gyro_step
         )
@@ -180,6 +180,12 @@ class Unit:
                 scale = 1.0 if w == "rad/s" else 1 / self.gyro_size
                 values[f"G_{x}{y}"] = (force[i, j] * scale, over(w, "m/s^2"))
         return values
+
+
+def wander(rng, step, n):
+    """Random walks (n, 3) about their mean: the bias of a log is that over all of it."""
+    walk = np.cumsum(rng.normal(0, step, (n, 3)), axis=0)
+    return walk - walk.mean(axis=0)
 
 
 def over(output, unit):

@@ -10,7 +10,14 @@ from held_recordings import Handling, held
 from turned_units import SIDES, Bench, Unit
 
 from inercal.cli import run
-from inercal.systems.imu.sections.cutting.table import quantity_of, read_table, side_of, write_table
+from inercal.systems.imu.sections.cutting.log import with_sides
+from inercal.systems.imu.sections.cutting.table import (
+    SectionRow,
+    quantity_of,
+    read_table,
+    side_of,
+    write_table,
+)
 
 SITE = ["--set", "site.latitude=48 deg", "--quiet"]
 HEAD = "t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2]"
@@ -139,14 +146,19 @@ def test_rows_of_means_are_sections(folder):
 
 
 def test_other_protocols_begin_as_before(folder):
-    """Poses in the hand and labels keep their methods, a stated method is kept, and no table is written."""
+    """Poses in the hand and labels of a turn keep their methods, a stated method is kept, and no table is written."""
     t, acc, gyro, _ = held(21)
     head = HEAD + ",gyro_x [rad/s],gyro_y [rad/s],gyro_z [rad/s]"
     written(folder / "hand.csv", head, t, acc, gyro)
     log_of_sides_and_turns(folder)
     lines = (folder / "log.csv").read_text().splitlines()
     (folder / "labelled.csv").write_text(
-        "\n".join([f"{lines[0]},label", *(f"{line},x_p" for line in lines[1:])])
+        "\n".join(
+            [
+                f"{lines[0]},label",
+                *(f"{line},{('x_p', 'x_rot')[k > 500]}" for k, line in enumerate(lines[1:])),
+            ]
+        )
     )
     for files, keys, expected in (
         (["hand.csv"], [], "multiposition"),
@@ -213,3 +225,46 @@ def test_true_forces_of_any_size_are_forces(folder):
         if p["name"].startswith(("K0", "K1")):
             assert abs(p["value"] - unit.truth[p["name"]]) < 4.0 * p["u"]
             assert p["u"] < 2e-3
+
+
+def test_labels_of_sides_are_sections(folder):
+    """Six labelled sides need no turns; the method ferraris would miss them."""
+    unit = Unit(np.random.default_rng(6), gravity=9.80880)
+    rests = [Bench(unit).rest(up).acc for up in SIDES.values()]
+    rng = np.random.default_rng(7)
+    rows, labels = [], []
+    for name, mean in zip(SIDES, rests, strict=True):
+        rows += [*(mean + rng.normal(0, 0.01, (300, 3)))]
+        labels += [name] * 300
+    lines = [
+        f"{0.01 * k:.2f},{','.join(f'{x:.6f}' for x in row)},{label}"
+        for k, (row, label) in enumerate(zip(rows, labels, strict=True))
+    ]
+    (folder / "sides.csv").write_text(
+        "\n".join(["t [s],acc_x [m/s^2],acc_y [m/s^2],acc_z [m/s^2],label", *lines])
+    )
+    assert run(["new", "imu", "sides.csv", *SITE]) == 0
+    assert method() == "sections"
+    assert [row.why for row in read_table("sections.csv")] == ["label"] * 6
+
+
+def test_a_case_that_is_turned_in_place_is_set_up_once():
+    """Rests in a row with one vertical share their placing; the same side after another is placed anew."""
+    x, y, z = np.eye(3)
+    ways = np.array([z, z, z + 0.01 * y, -z, x, x, -x, y, -y, z])
+    rests = [SectionRow(f"rest {k}", "log.csv") for k in range(len(ways))]
+    setups = [row.setup for row in with_sides(rests, 9.8 * ways)]
+    assert setups == ["log.csv 1", "log.csv 1", "", "", "log.csv 4", "log.csv 4", "", "", "", ""]
+
+
+def test_a_file_whose_name_begins_with_a_minus_is_a_file(folder):
+    """A shell makes `-x.csv` of `*.csv`: an option it is only where no such file lies there."""
+    unit = Unit(np.random.default_rng(8), gravity=9.80880)
+    rng = np.random.default_rng(9)
+    files = []
+    for up in SIDES.values():
+        files.append(f"{'+-'[int(np.sum(up) < 0)]}{'xyz'[int(np.argmax(np.abs(up)))]}.csv")
+        rows = Bench(unit).rest(up).acc + rng.normal(0, 0.01, (300, 3))
+        written(folder / files[-1], HEAD, 0.01 * np.arange(300), rows)
+    assert run(["calibrate", "imu", *files, "--latitude", "48 deg", "--quiet", "--out", "out.json"]) == 0
+    assert json.loads((folder / "out.json").read_text())["status"]["code"] == "ok"

@@ -1,6 +1,6 @@
 """A title says which channel a column is and in which unit, in the spellings that loggers use."""
 
-from inercal.foundation.records.titles import fits, titled
+from inercal.foundation.records.titles import canonical, fits, titled
 from rows import for_each
 
 
@@ -50,3 +50,17 @@ def test_a_unit_beside_the_title_is_as_good():
     assert fits("gyro_y", "mdps")
     assert not fits("gyro_y", "mg")
     assert not fits("gyro_y", "")
+
+
+def test_times_in_other_words_stand_beside_canonical_names():
+    """`time [s]` beside `gyro_z [deg/s]` is t; a column of t itself, or a time without a unit, is not overruled."""
+    known = canonical([(0, "time [s]", None), (1, "gyro_z [deg/s]", None)], "log.csv")
+    assert {channel.name: (channel.origin, channel.unit.symbol) for channel in known} == {
+        "gyro_z": (1, "deg/s"),
+        "t": (0, "s"),
+    }
+    both = canonical([(0, "Timestamp [us]", None), (1, "t [s]", None), (2, "acc_x [m/s^2]", None)], "log.csv")
+    assert next(channel.origin for channel in both if channel.name == "t") == 1
+    assert [
+        channel.name for channel in canonical([(0, "time", None), (1, "acc_x [m/s^2]", None)], "log.csv")
+    ] == ["acc_x"]

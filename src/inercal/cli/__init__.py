@@ -89,7 +89,7 @@ def run(arguments: list[str] | None = None) -> int:
         _LINE[:] = arguments
         from inercal.cli.tree import call  # here, so that an interrupt during loading is caught too
 
-        code = call(arguments)
+        code = call([f"./{word}" if _is_a_file(word) else word for word in arguments])
         sys.stdout.flush()
         return int(code or 0)
     except KeyboardInterrupt:
@@ -140,6 +140,11 @@ def _say(text: str) -> None:
 
     with contextlib.suppress(OSError, ValueError):
         print(f"inercal: {printable(text)}", file=sys.stderr, flush=True)
+
+
+def _is_a_file(word: str) -> bool:
+    """True for the name of a file that looks like an option: ``-x.csv``, as a shell makes of ``*.csv``."""
+    return re.fullmatch(r"-[^-=]+\.\w+", word) is not None and os.path.isfile(word)
 
 
 def command_line() -> list[str]:

@@ -37,7 +37,7 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
     unit, or with one that it cannot have, or no channel at all, and `QuantityError` for something else than a unit.
     """
     channels: dict[str, Channel] = {}
-    titles_read = []
+    titles, titles_read = list(titles), []
     for origin, title, unit_beside in titles:
         titles_read.append(shortened(title))
         match = _TITLE.fullmatch(title) if len(title) <= TITLE else None
@@ -61,7 +61,19 @@ def canonical(titles: Iterable[tuple[Origin, str, str | None]], where: object) -
             f"found the columns {counted_names(titles_read, 8)}, expected known ones as in {EXAMPLE}, or a map "
             "(`inercal new` imu, turntable, selfcal or aoa writes one)",
         )
+    if "t" not in channels:
+        times = (_time(origin, *name_and_unit(title), beside) for origin, title, beside in titles)
+        if (time := next((one for one in times if one is not None), None)) is not None:
+            channels["t"] = time
     return tuple(channels.values())
+
+
+def _time(origin: Origin, name: str, unit: str | None, beside: str | None) -> Channel | None:
+    """The column of times whose name says so in other words, beside its unit, as ``time [s]``; None for any other."""
+    text = unit or beside
+    if text is None or said(name, text).sensor != "t" or not fits("t", text):
+        return None
+    return Channel("t", origin, parse_unit(text))
 
 
 #: sensors of rigs -> names; those of an instrument are told by `inercal.foundation.records.recognise.words`

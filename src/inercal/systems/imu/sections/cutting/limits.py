@@ -106,6 +106,9 @@ class Limits:
     turned_vertical: float = 0.35
     """Change of specific force over a rotation, as a part of gravity, up to which it may be a turn about an axis."""
 
+    turned_in_place: float = math.radians(0.1)
+    """Angle [rad] between two rests on a side, up to which the case was turned in place and not set down anew."""
+
     least_turn: float = 0.2
     """Rotation, as a part of the largest between two holds, from which it may be a turn."""
 

@@ -93,7 +93,18 @@ def with_sides(rests: Sequence[SectionRow], means: Array) -> list[SectionRow]:
         angle = np.degrees(np.arccos(min(float(abs(way[k])), 1.0)))
         why = f"detected, {angle:.0f} deg off {direction(way)}"
         told.append(replace(rest, up=np.eye(3)[k] * np.sign(way[k]) if sided else None, why=why))
-    return told
+    return _not_touched(told, ways) if sided else told
+
+
+def _not_touched(rests: Sequence[SectionRow], ways: Array) -> list[SectionRow]:
+    """Rests on sides, those in a row with the same vertical (n, 3) under one setup: turned in place, not set down."""
+    near = np.linalg.norm(np.diff(ways, axis=0), axis=1) < LIMITS.turned_in_place
+    number = np.concatenate([[0], np.cumsum(~near)])
+    several = {k for k in number.tolist() if np.count_nonzero(number == k) > 1}
+    return [
+        replace(rest, setup=f"{rest.file} {k + 1}" if k in several else "")
+        for rest, k in zip(rests, number.tolist(), strict=True)
+    ]
 
 
 def of_holds(
