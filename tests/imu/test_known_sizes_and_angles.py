@@ -1,6 +1,7 @@
 """Pose means, known rates and known turns: against truth by simulators of plain NumPy, and against real recordings."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -233,12 +234,12 @@ def test_what_changes_over_the_orientations_is_named(drift, words):
     assert finding.harm
 
 
-@pytest.mark.slow
-def test_trends_are_named_falsely_as_rarely_as_stated():
-    """30 sound tests: two tests of 1e-3 each, at 99.99 %."""
+@pytest.mark.parametrize("tests", [9, pytest.param(200, marks=pytest.mark.campaign)])
+def test_trends_are_named_falsely_as_rarely_as_stated(tests):
+    """In sound tests: two tests of 1e-3 each, at 99.99 %."""
     rng = np.random.default_rng(15)
-    named = sum("trend" in {each.code for each in by_rates(platter(rng)[1]).findings} for _ in range(30))
-    assert named <= binom.ppf(0.9999, 30, 2e-3)
+    named = sum("trend" in {each.code for each in by_rates(platter(rng)[1]).findings} for _ in range(tests))
+    assert named <= binom.ppf(0.9999, tests, 2e-3)
 
 
 def test_steady_stretches_of_a_recording_are_the_orientations():
@@ -280,18 +281,18 @@ def test_a_bias_that_drifts_in_each_file_is_in_u():
     assert "bias_drift" in {finding.code for finding in drifting.findings}
 
 
-@pytest.mark.slow
-def test_k2_beyond_what_was_stated_is_named_and_hardly_ever_without():
-    """A K2 of 1000 ug/g^2 where 0 ± 20 is stated, which a scatter that nobody states would swallow; 40 sound tables at
+@pytest.mark.parametrize("tables", [18, pytest.param(400, marks=pytest.mark.campaign)])
+def test_k2_beyond_what_was_stated_is_named_and_hardly_ever_without(tables):
+    """A K2 of 1000 ug/g^2 where 0 ± 20 is stated, which a scatter that nobody states would swallow; sound tables at
     5e-4 each, at 99.99 %."""
     rng, stated = np.random.default_rng(24), 20e-6 / 9.80665
     large = by_means(pose_means(rng, k2=np.array([50.0, 0.0, 0.0]) * stated)[1], k2_u=stated)
     assert large.status is Status.SUSPECT
     (finding,) = [each for each in large.findings if each.code == "unmodelled_k2"]
     assert "K0_x" in finding.harm
-    sound = [by_means(pose_means(rng, k2=stated * rng.normal(size=3))[1], k2_u=stated) for _ in range(40)]
+    sound = [by_means(pose_means(rng, k2=stated * rng.normal(size=3))[1], k2_u=stated) for _ in range(tables)]
     named = sum("unmodelled_k2" in {each.code for each in one.findings} for one in sound)
-    assert named <= binom.ppf(0.9999, 40, 5e-4)
+    assert named <= binom.ppf(0.9999, tables, 5e-4)
 
 
 def test_the_alignment_that_nobody_states_is_in_u():
@@ -413,10 +414,9 @@ def test_turns_of_a_real_unit_give_what_ferraris_gives():
         assert abs(here.value - there.value) < 3.0 * np.hypot(here.u, there.u)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["known_rates", "known_turns"])
-@for_each("row, t", [(0, 90.0), (700, 907.0), (700, 0.7), (-1, 9999.0)])
-def test_one_wrong_stamp_changes_next_to_nothing(method, row, t):
+@cache
+def sound_files(method):
+    """Files of a sound test, the settings, and their calibration."""
     rng = np.random.default_rng(12)
     if method == "known_rates":
         options = KnownRatesSettings(tuple(RATES), tuple(RATES_U))
@@ -428,11 +428,18 @@ def test_one_wrong_stamp_changes_next_to_nothing(method, row, t):
     else:
         options, records = KnownTurnsSettings(tuple(ANGLES), tuple(ANGLES_U), TILT), turns(rng)[1]
     settings = ImuSettings(SITE, method=options)
-    first, *others = records
+    return records, settings, calibrate_files(records, settings).estimate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["known_rates", "known_turns"])
+@for_each("row, t", [(0, 90.0), (700, 907.0), (700, 0.7), (-1, 9999.0)])
+def test_one_wrong_stamp_changes_next_to_nothing(method, row, t):
+    (first, *others), settings, sound = sound_files(method)
     stamps = first["gyro_x"].t.copy()
     stamps[row] = t
     wrong = ic.record(t=stamps, gyro=first.triad("gyro").values, units={"gyro": "count"})
-    sound, found = (calibrate_files([each, *others], settings).estimate for each in (first, wrong))
+    found = calibrate_files([wrong, *others], settings).estimate
     assert found.status is sound.status is Status.OK
     of_found, of_sound = ({finding.code for finding in each.findings} for each in (found, sound))
     assert of_found - of_sound == {"outlying_time"}
