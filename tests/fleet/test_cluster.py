@@ -190,7 +190,7 @@ def test_a_worker_that_is_killed_and_one_that_hangs_lose_nothing(tmp_path, expec
 
 @pytest.mark.slow
 def test_work_that_ends_every_worker_is_named(tmp_path):
-    with cluster(tmp_path, 3, failures="1") as (file, _, _), pytest.raises(ChunkLostError) as caught:
+    with cluster(tmp_path, failures="1") as (file, _, _), pytest.raises(ChunkLostError) as caught:
         run(deadly, runs=1, seed=SEED, executor=Cluster(file), chunk=1)
     assert caught.value.chunk == range(0, 1)
 
@@ -198,7 +198,7 @@ def test_work_that_ends_every_worker_is_named(tmp_path):
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_the_command_which_goes_on_later(tmp_path, expected):
     kept = tmp_path / "kept"
-    with cluster(tmp_path) as (file, processes, _):
+    with cluster(tmp_path, 1) as (file, processes, _):
         seen = []
 
         def progress(done, runs):

@@ -187,13 +187,18 @@ RARE = {
     "spoiled", [pytest.param(each, marks=pytest.mark.campaign) if each in RARE else each for each in SPOILED]
 )
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_verdict_or_one_sentence(name, spoiled, folder, monkeypatch, capsys):
+@pytest.mark.parametrize("turn", [0, pytest.param(1, marks=pytest.mark.campaign)])
+def test_a_verdict_or_one_sentence(name, spoiled, turn, folder, monkeypatch, capsys):
+    """The commands on a file take turns: one of two beside this record, the other beside the next."""
+    commands = COMMANDS[name][(turn + [*SPOILED].index(spoiled)) % 2 :: 2]
+    if len(COMMANDS[name]) == 1:
+        commands = COMMANDS[name] if turn == 0 else []
     monkeypatch.chdir(folder)
     monkeypatch.setenv("PYTHONWARNINGS", "error")
     rows = SPOILED[spoiled](columns(name))
     text = "".join(",".join("" if v != v else repr(v) for v in row) + "\n" for row in rows.tolist())
     Path(name).write_text(f"{HEADS[name]}\n{text}")
-    for command in COMMANDS[name]:
+    for command in commands:
         for path in folder.glob("NEW*"):
             path.unlink()
         check(command.split(), capsys)

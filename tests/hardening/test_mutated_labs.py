@@ -34,9 +34,7 @@ SCALARS = st.one_of(
 )  # fmt: skip
 
 
-@settings(
-    derandomize=True, deadline=None, max_examples=150, suppress_health_check=list(HealthCheck), database=None
-)
+@settings(derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 @given(st.lists(st.tuples(st.sampled_from(KEYS), SCALARS), min_size=1, max_size=3))
 def test_a_certificate_or_one_sentence(spoils):
     data = copy.deepcopy(WHOLE)

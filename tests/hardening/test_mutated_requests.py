@@ -151,7 +151,7 @@ def spoil_requests(answering, examples):
 
 
 @pytest.mark.parametrize(
-    "examples", [120, pytest.param(5000, marks=pytest.mark.campaign)], ids=["short", "rest"]
+    "examples", [60, pytest.param(5000, marks=pytest.mark.campaign)], ids=["short", "rest"]
 )
 def test_a_spoiled_request_has_an_answer(answering, examples):
     spoil_requests(answering, examples)

@@ -23,9 +23,7 @@ from inercal.faces.studies.turntable import turntable_study
 from inercal.foundation.errors import StudyError
 
 # the seed of the examples is fixed: that of each test's own source
-FIXED = settings(
-    derandomize=True, deadline=None, max_examples=120, suppress_health_check=list(HealthCheck), database=None
-)
+FIXED = settings(derandomize=True, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 KINDS = {
     "imu": (partial(filled, "imu"), imu_study),
     "strapdown": (partial(filled, "strapdown"), strapdown_study),

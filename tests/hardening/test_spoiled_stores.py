@@ -17,7 +17,7 @@ from inercal.laboratory.check import check
 from inercal.laboratory.keep import keep
 from inercal.laboratory.store import make_store, open_store
 
-SHORT, CASES = 25, 500
+SHORT, CASES = 12, 500
 COUNTS = pytest.mark.parametrize(
     "cases",
     [range(SHORT), pytest.param(range(SHORT, CASES), marks=pytest.mark.campaign)],

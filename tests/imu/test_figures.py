@@ -14,7 +14,6 @@ from inercal.foundation.inputs import Source
 from inercal.foundation.records.column import Column
 from inercal.foundation.records.record import Record
 from inercal.foundation.units import parse_unit
-from inercal.systems.imu import figures
 from inercal.systems.imu.figures import page, pictures
 from inercal.systems.imu.settings import ImuSettings
 from inercal.systems.imu.task import calibrate
