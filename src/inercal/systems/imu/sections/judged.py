@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.judge import asked_of, blind, evidence_of, judge
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.inference.questions import JudgedFit, StatedInput, questions
 from inercal.systems.imu.sections.calibration import SectionCalibration, in_outputs
 from inercal.systems.imu.sections.outputs import rows
@@ -26,7 +27,9 @@ def judged_sections(found: SectionCalibration) -> tuple[Finding, ...]:
     except np.linalg.LinAlgError:
         return ()
     unseen = blind(fit.names, fit.u, of_fit, asked_of(of_fit, questions(fit))) if of_fit.dof > 0 else ()
-    return (*judge(fit), *unseen)
+    # residuals of terms by what was known are smaller than noise, beside which noise would look like a fault
+    told = found.freedom - len(found.by_prior)
+    return (*(judge(fit) if told >= INFERENCE.fewest_degrees else ()), *unseen)
 
 
 class _Dense(NamedTuple):
