@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.inference.judge import asked_of, blind, evidence_of, judge
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.inference.questions import JudgedFit, Question, StatedInput, questions
 from inercal.systems.imu.sections.calibration import SectionCalibration, in_outputs
 from inercal.systems.imu.sections.cutting.cut import ENDS
@@ -30,7 +31,9 @@ def judged_sections(found: SectionCalibration) -> tuple[Finding, ...]:
     more = [*_of_physics(found, fit)]
     pairs = asked_of(of_fit, [*more, *questions(fit)])
     unseen = blind(fit.names, fit.u, of_fit, pairs) if of_fit.dof > 0 else ()
-    return (*judge(fit, more=more), *unseen)
+    # residuals of terms by what was known are smaller than noise, beside which noise would look like a fault
+    told = found.freedom - len(found.by_prior)
+    return (*(judge(fit, more=more) if told >= INFERENCE.fewest_degrees else ()), *unseen)
 
 
 def _of_physics(found: SectionCalibration, fit: JudgedFit) -> Iterator[Question]:
