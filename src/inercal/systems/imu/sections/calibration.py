@@ -240,7 +240,7 @@ def _result(fit: FittedSections, agreement: dict[str, float]) -> SectionCalibrat
         leaning=tuple(np.array(names)[leaning].tolist()),
         scatter={name: float(np.exp(weights @ logs[:, k])) for k, name in enumerate(problem.sizes)},
         scatter_dof={
-            name: float(degrees(np.maximum(4.0 * weights @ (logs[:, k] - weights @ logs[:, k]) ** 2, 1e-12)))
+            name: float(degrees(float(4.0 * weights @ (logs[:, k] - weights @ logs[:, k]) ** 2) + 1e-12))
             for k, name in enumerate(problem.sizes)
         },
         beyond={

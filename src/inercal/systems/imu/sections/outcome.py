@@ -64,6 +64,9 @@ MODEL = Formula(
 REFERENCES = (
     "Patterson, Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58 (1971) 545",
 )
+_OPEN = "not_stated"
+"""The question of sections that do not count yet: the others are fitted. Where names are denied, nothing is."""
+
 _KNOWN = "axes of the case, by the known directions and axes"
 _OWN = "z along the input axis of accelerometer z, y in the plane of the input axes of accelerometers y and z"
 _OF_GYRO = "z along the input axis of gyro z, y in the plane of the input axes of gyros y and z"
@@ -162,6 +165,8 @@ def of_proposal(
             Estimate.without(basis, status, text, findings=findings, result=none), sections
         )
 
+    if any(question.code != _OPEN for question in proposal.questions):
+        return without(Status.INCONSISTENT, "")
     if not sections and proposal.swings:
         progress("fitting the swing")
         return CalibrationFromSections(

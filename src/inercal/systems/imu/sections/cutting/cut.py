@@ -6,7 +6,7 @@ A turn whose stretch holds no rests is read as it is stated, the output at rest 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.findings import Finding
+from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.systems.imu.limits import LIMITS
-from inercal.systems.imu.sections.cutting.holds import still_edges
+from inercal.systems.imu.sections.cutting.holds import drifting, still_edges
 from inercal.systems.imu.sections.cutting.limits import LIMITS as FINDING
 from inercal.systems.imu.sections.cutting.noise_of_means import variances_of_means
 from inercal.systems.imu.sections.cutting.table import SectionRow
@@ -114,6 +114,7 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
         for k, stretch in enumerate(stretches)
         if stretch.row.kind in SENSED and stretch.row.kind != "turn"
     }
+    done |= _moving_rests(stretches, done)
     rests = [
         one.section.gyro
         for one in done.values()
@@ -135,8 +136,9 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
         unused[row.section] = one.why
         if one.code:
             act = "Record it again, or move its ends."
+            harm = EVERYTHING if one.code == "not_at_rest" else ()
             notes.append(
-                Finding(one.code, f"{row.section} is not used: {one.why}.", _where(row), (), action=act)
+                Finding(one.code, f"{row.section} is not used: {one.why}.", _where(row), harm, action=act)
             )
     sections = [one.section for one in read]
     for steady in (False, True):  # a table at a rate shakes
@@ -155,6 +157,26 @@ def cut(stretches: Sequence[Stretch]) -> Cut:
                 else:
                     sections[k] = dataclasses.replace(sections[k], gyro_var=known)
     return Cut(tuple(sections), unused, tuple(notes))
+
+
+def _moving_rests(stretches: Sequence[Stretch], done: Mapping[int, _Read | Flaw]) -> dict[int, Flaw]:
+    """Rests in which specific force drifts, where enough of them tell its size."""
+    rests = {
+        k: one.section.acc
+        for k, one in done.items()
+        if isinstance(one, _Read) and one.section.kind == "rest" and one.section.acc is not None
+    }
+    if len(rests) < FINDING.sides_to_compare:
+        return {}
+    gravity = 0.5 * float(np.max(np.ptp(list(rests.values()), axis=0)))
+    out = {}
+    for k in rests:
+        acc = stretches[k].acc
+        assert acc is not None
+        block = max(round(FINDING.still_window / FINDING.blocks_of_window / acc.step), 2)
+        if len(acc.t) >= 6 * block and (why := drifting(acc.values, gravity, block)):
+            out[k] = Flaw("not_at_rest", why)
+    return out
 
 
 def _where(row: SectionRow) -> str:

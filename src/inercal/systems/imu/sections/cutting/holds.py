@@ -233,7 +233,7 @@ def _judged(
         why |= {
             hold: reason
             for hold in holds
-            if hold not in why and (reason := _drifting(hold.of(acc), gravity, block))
+            if hold not in why and (reason := drifting(hold.of(acc), gravity, block))
         }
     left = [hold for hold in holds if hold not in why]
     if gyro is not None and len(left) >= LIMITS.holds_to_compare:
@@ -262,8 +262,8 @@ def _too_short(t: Array, hold: Dwell) -> str:
     )
 
 
-def _drifting(x: Array, gravity: float, block: int) -> str:
-    """A reason in words, empty if rows (n, 3) of one hold do not drift."""
+def drifting(x: Array, gravity: float, block: int) -> str:
+    """A reason in words, empty if rows (n, 3) of one hold do not drift; means of a ``block`` of rows tell the noise."""
     third = len(x) // 3
     count = third // block
     change = x[-third:].mean(axis=0) - x[:third].mean(axis=0)
