@@ -298,8 +298,8 @@ def test_modules_can_be_read_in_one_go():
 CEILINGS = {
     "names used across folders": 1515,
     "class names shared": 5,
-    "constants outside Limits": 449,
-    "modules": 667,
+    "constants outside Limits": 450,
+    "modules": 668,
 }
 
 

@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 from inercal.foundation.errors import RecordError
+from inercal.foundation.records.read.json_arrays import is_one_document
 
 _HEAD = 1 << 16
 """Bytes that are looked at."""
@@ -50,9 +51,27 @@ def format_by_content(path: Path) -> str:
             raise RecordError(path, sentence)
     if head.startswith(_ZIP):
         return _of_archive(path)
+    if is_one_document(head):
+        return "json_arrays"
     if (zero := head.find(0)) >= 0:
         raise RecordError(path, binary(zero))
     return "text"
+
+
+def is_json(path: Path) -> bool:
+    """True for a file that is one document of JSON, whatever its ending."""
+    try:
+        with path.open("rb") as file:
+            begins = file.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
+        return begins and is_one_document(_head(path))
+    except OSError:
+        return False
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(_HEAD)
 
 
 def binary(zero: int) -> str:
