@@ -18,19 +18,6 @@ from inercal.foundation.records.read.rewriting import flat
 _FEWEST = 2  # rows
 
 
-def is_one_document(head: bytes) -> bool:
-    """True for a text that is one value of JSON, not a value each line; ``head`` are its first bytes."""
-    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if not text.startswith((b"{", b"[")):
-        return False
-    first, _, rest = text.partition(b"\n")
-    try:
-        value = json.loads(first)
-    except (ValueError, RecursionError):
-        return first.strip() in (b"{", b"[") or len(rest.strip()) == 0 or b"[" in first
-    return not rest.strip() or not isinstance(value, dict)
-
-
 @contextmanager
 def _opened(path: Path) -> Iterator[Contents]:
     """The arrays by their names, joined by points; objects in an array are the rows of a table."""

@@ -204,7 +204,7 @@ def _one_kind(files: Sequence[FileGuess]) -> bool:
 
 
 def _stamps(file: FileGuess) -> list[str]:
-    """How the stamps of a file are read, as TOML; nothing of plain numbers."""
+    """Keys by which the stamps of a file are read, as TOML; none of plain numbers."""
     stamps = file.guesses["t"].stamps if "t" in file.guesses else None
     if stamps is None:
         return []

@@ -109,8 +109,8 @@ def look(
 
 
 def _together(samples: Sequence[FirstLook]) -> list[FirstLook]:
-    """Arrays of a file as one table where they are as long as each other, and each names its columns or is a triad of the
-    sensor that its name says: what one tells of the other is seen then."""
+    """Arrays of a file as one table where they are equally long, and each names its columns or is a triad of the sensor
+    that its name says: what one tells of the other is seen then."""
     made: list[FirstLook] = []
     for rows in dict.fromkeys(len(sample.values) for sample in samples):
         alike = [sample for sample in samples if len(sample.values) == rows]
