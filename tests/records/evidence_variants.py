@@ -47,9 +47,9 @@ def names(*stems):
     return ",".join(f"{stem}{axis}" for stem in stems for axis in "xyz")
 
 
-def xyz(sensor, first, units=None):
-    """The channels of a triad whose columns are named alike."""
-    return {f"{sensor}_{axis}": first.replace("*", axis) for axis in "xyz"}
+def xyz(sensor, first):
+    """The channels of a triad whose columns are named alike, with x, y, z for * and X, Y, Z for ^."""
+    return {f"{sensor}_{axis}": first.replace("*", axis).replace("^", axis.upper()) for axis in "xyz"}
 
 
 SIDES = [
@@ -216,13 +216,13 @@ VARIANTS = {
     "six named sides": (
         "side,aX,aY,aZ\n" + "\n".join(SIDES) + "\n",
         {},
-        xyz("acc", "a*") | {"label": "side"},
+        xyz("acc", "a^") | {"label": "side"},
         False,
     ),
     "six sides in words": (
         "side;aX;aY;aZ\n" + "\n".join(SIDES).replace(",", ";") + "\n",
         {},
-        xyz("acc", "a*") | {"label": "side"},
+        xyz("acc", "a^") | {"label": "side"},
         False,
     ),
     "six numbered rows": (

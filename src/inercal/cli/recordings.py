@@ -8,7 +8,7 @@ from pathlib import Path
 
 from inercal.cli.options import OutputOptions, ReportOutput, ResultOutput, working
 from inercal.cli.outcome import WHOLE, emit, give, timed
-from inercal.cli.records_in import Files, MapFile, Span, read_record
+from inercal.cli.records_in import Answers, Files, MapFile, Span, read_record
 from inercal.cli.streaming import Every, StreamFile, StreamOptions, interval_of, run_stream
 
 
@@ -100,6 +100,7 @@ def monitor(
     *,
     map_file: MapFile = None,
     every: Every = None,
+    answers: Answers = None,
     streaming: StreamOptions = StreamOptions(),
     output: OutputOptions = OutputOptions(),
 ) -> None:
@@ -108,4 +109,4 @@ def monitor(
 
     interval = interval_of(every)
     streaming.check(output, (file, map_file))
-    run_stream(prepared(interval, output.say), file, map_file, output, streaming)
+    run_stream(prepared(interval, output.say), file, map_file, output, streaming, answers or ())

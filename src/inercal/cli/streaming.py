@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -150,7 +150,7 @@ def stream_study(
     """Run the estimator of a study on a stream, and give it back; ``prepare`` stands for that of the system."""
     from inercal.faces.python.study import read_study
 
-    span.refuse("a stream")
+    replace(span, answers=None).refuse("a stream")
     file, interval = streamed(files), interval_of(every)
     options.check(output, (file, map_file, study))
     of = read_study(kind, study, keys)
@@ -165,7 +165,7 @@ def stream_study(
             made.append(make(lines))
         return made[-1]
 
-    run_stream(estimator, file, map_file, output, options)
+    run_stream(estimator, file, map_file, output, options, span.answers or ())
     return made[-1]
 
 
@@ -175,18 +175,26 @@ def run_stream(
     map_file: Path | None,
     output: OutputOptions,
     options: StreamOptions,
+    answered: Sequence[str] = (),
 ) -> None:
     """Run the estimator that is made for the columns of a stream, from its lines to lines on standard output.
 
-    A reader that leaves ends it in order; the lines it did not take are given again after a restart.
+    Without a map columns are recognised where the header does not say what they are. A reader that leaves ends it in
+    order; the lines it did not take are given again after a restart.
     """
     from inercal.faces.stream.lines import Lines
     from inercal.faces.stream.run import run
 
-    record_map = map_in(map_file)
+    record_map = map_in(map_file, answered)
     settle_lines()
     with _opened(file) as stream:
         where = _STANDARD_INPUT if file is None else str(file)
+        if map_file is None:
+            from inercal.faces.stream.recognised import recognised_stream
+
+            stream, record_map = recognised_stream(stream, where, answered)
+            for sensor, words in ({} if record_map is None else record_map.taken).items():
+                output.say(f"{sensor}: {words}")
         lines = Lines(stream, where, record_map, output.say_finding)
         try:
             run(estimator(lines), lines, _write, options.saving, output.say, options.received)

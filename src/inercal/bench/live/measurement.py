@@ -222,7 +222,7 @@ class RunningMeasurement:
             self._intake.begin()
             self._feed, self.state = feed, "waiting"
             try:
-                lines = Lines(feed, str(source), feed.record_map, self._found)  # type: ignore[arg-type]
+                lines = Lines(feed, str(source), feed.record_map, self._found)
             except RecordError:
                 if self._stop.is_set():
                     return  # before a row came

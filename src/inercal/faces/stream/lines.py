@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -51,6 +51,13 @@ class StreamLine(NamedTuple):
             return self.data.decode("utf-8")
         except UnicodeDecodeError:
             return self.data.decode("latin-1")
+
+
+class LineSource(Protocol):
+    """Lines of bytes, one after the other."""
+
+    def readline(self, size: int = -1, /) -> bytes:
+        """The next line, or at most ``size`` bytes of it; empty at the end."""
 
 
 class Sample(NamedTuple):
@@ -108,7 +115,7 @@ class Lines:
     """
 
     def __init__(
-        self, stream: IO[bytes], where: str, record_map: RecordMap | None, say: Callable[[Finding], None]
+        self, stream: LineSource, where: str, record_map: RecordMap | None, say: Callable[[Finding], None]
     ) -> None:
         self._stream, self.where, self._say = stream, where, say
         self._number = 0

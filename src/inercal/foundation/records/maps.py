@@ -78,22 +78,9 @@ class ColumnEntry(Strict):
         return value
 
 
-class NamedFileEntry(FileEntry):
-    """``[file.NAME]``: one of several files, or of the clocks of one, with its own layout and columns."""
+class StampsEntry(Strict):
+    """``[file.NAME.time]``: how the stamps of a file are read, where they differ from those of others."""
 
-    path: str = Field(min_length=1, description="the file, beside the map")
-    columns: dict[str, ColumnEntry] = Field(min_length=1, description="its channels, each a table as above")
-
-
-class TimeEntry(Strict):
-    """``[time]``: the sample rate of files without a time column, or whose stamps can't be trusted."""
-
-    rate: str | None = Field(
-        default=None,
-        description="sample rate, for files without a time column, perhaps with its standard uncertainty",
-        examples=["100.00(1) Hz"],
-    )
-    ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
     stamps: Literal["year-first", "day-first", "month-first", "time of day"] | None = Field(
         default=None,
         description="order of dates with times in words; time of day alone goes on over midnight",
@@ -116,6 +103,27 @@ class TimeEntry(Strict):
         rest = parse_unit(self.rest, "time.rest").factor if self.rest else 0.0
         beside = tuple(self.beside) if isinstance(self.beside, list) else self.beside
         return TimeForm(self.stamps or "", beside, rest, self.wrap)
+
+
+class TimeEntry(StampsEntry):
+    """``[time]``: the sample rate of files without a time column, or whose stamps can't be trusted."""
+
+    rate: str | None = Field(
+        default=None,
+        description="sample rate, for files without a time column, perhaps with its standard uncertainty",
+        examples=["100.00(1) Hz"],
+    )
+    ignore: bool = Field(default=False, description="take the rate in the place of stamps not to be trusted")
+
+
+class NamedFileEntry(FileEntry):
+    """``[file.NAME]``: one of several files, or of the clocks of one, with its own layout and columns."""
+
+    path: str = Field(min_length=1, description="the file, beside the map")
+    columns: dict[str, ColumnEntry] = Field(min_length=1, description="its channels, each a table as above")
+    time: StampsEntry = Field(
+        default=StampsEntry(), description="how its stamps are read, if not as `[time]` says"
+    )
 
 
 class MapEntry(Strict):
@@ -275,6 +283,7 @@ def _part(name: str, table: Mapping[str, Any], path: object, of_t: TimeForm | No
     """One ``[file.NAME]``."""
     where = f"{path}: file.{name}"
     entry = check(NamedFileEntry, table, where, MapError)
+    of_t = entry.time.of_t or of_t
     return FileShare(_channels(entry.columns, where, of_t), entry.laid_out, name, entry.path)
 
 

@@ -108,7 +108,7 @@ _OF_A_TABLE = (
     ("y_x", r"(?:out|output|reading|signal) x"),
     ("y_y", r"(?:out|output|reading|signal) y"),
 )
-_LABEL = r"label|part|section|pose"
+_LABEL = r"label|part|section|pose|side|seite|lage|face"
 
 
 def titled(title: str, given: str | None = None) -> tuple[str | None, str | None]:

@@ -15,7 +15,7 @@ from inercal.foundation.errors import InputError, MapError, RecordError
 from inercal.foundation.findings import Finding
 from inercal.foundation.inputs import Source
 from inercal.foundation.records.checks import check
-from inercal.foundation.records.read.content import format_by_content
+from inercal.foundation.records.read.content import format_by_content, is_json
 from inercal.foundation.records.read.join import FileTable, joined
 from inercal.foundation.records.read.limits import size_of
 from inercal.foundation.records.read.table import FileShare, Format, Reader
@@ -297,7 +297,7 @@ def format_of(path: Path) -> Format:
                 there = "a pipe or a device" if is_pipe(path) else "no such file"
                 kind = "a folder" if path.is_dir() else there
                 raise RecordError(path, f"found {kind}, expected a recording in a file")
-            return _module(module)
+            return _module("json_arrays" if module == "text" and is_json(path) else module)
     if path.is_dir():
         raise RecordError(
             path, "is a folder without metadata.yaml (a ROS 2 bag has one), expected a recording"

@@ -245,6 +245,7 @@ def samples(contents: Contents, path: Path) -> list[FirstLook]:
     if lying:
         contents = transposed(contents, path)
     options = FileOptions(transpose=lying)
+    stated = _rates(contents)
     arrays = {name: array for name, array in islice(contents.arrays.items(), FIELDS) if array.rows > 1}
     check_unpacked(path, sum(8 * each.rows * each.columns for each in arrays.values()), size_of(path))
     looks = []
@@ -255,12 +256,28 @@ def samples(contents: Contents, path: Path) -> list[FirstLook]:
                 [np.full(rows, np.nan) if each.text else numbers(each.load(0)) for each in single.values()]
             )
             units = tuple(each.unit for each in single.values())
-            looks.append(FirstLook(values, tuple(single), options, units=units))
+            looks.append(FirstLook(values, tuple(single), options, units=units, stated=stated))
     for name, array in arrays.items():
         if array.columns > 1 and not array.text:
             values = np.column_stack([numbers(array.load(column)) for column in range(array.columns)])
-            looks.append(FirstLook(values, (), options, name))
+            looks.append(FirstLook(values, (), options, name, stated=stated))
     return looks
+
+
+def _rates(contents: Contents) -> tuple[str, ...]:
+    """Single numbers whose names say that they are the sample rate, or its interval [s], as lines."""
+    lines = []
+    for name, array in islice(contents.arrays.items(), FIELDS):
+        last = re.split(r"[/.]", name)[-1].lower()
+        word = re.fullmatch(
+            r"(fs|rate|sample_?rate|sampling_?(?:rate|frequency)|freq\w*)|(dt|ts|sample_?time)(?:_s)?", last
+        )
+        if word is None or array.rows != 1 or array.columns != 1 or array.text:
+            continue
+        number = float(numbers(array.load(0))[0])
+        if np.isfinite(number) and number > 0.0:
+            lines.append(f"rate = {number if word[1] else 1.0 / number:.10g}")
+    return tuple(lines)
 
 
 def _lies_on_its_side(array: NamedArray) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections import Counter
 from pathlib import Path
@@ -50,9 +51,40 @@ def format_by_content(path: Path) -> str:
             raise RecordError(path, sentence)
     if head.startswith(_ZIP):
         return _of_archive(path)
+    if _is_one_document(head):
+        return "json_arrays"
     if (zero := head.find(0)) >= 0:
         raise RecordError(path, binary(zero))
     return "text"
+
+
+def _is_one_document(head: bytes) -> bool:
+    """True for a text that is one value of JSON, not a value each line; ``head`` are its first bytes."""
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not text.startswith((b"{", b"[")):
+        return False
+    first, _, rest = text.partition(b"\n")
+    try:
+        value = json.loads(first)
+    except (ValueError, RecursionError):
+        return first.strip() in (b"{", b"[") or len(rest.strip()) == 0 or b"[" in first
+    return not rest.strip() or not isinstance(value, dict)
+
+
+def is_json(path: Path) -> bool:
+    """True for a file that is one document of JSON, whatever its ending."""
+    try:
+        with path.open("rb") as file:
+            begins = file.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
+        return begins and _is_one_document(_head(path))
+    except OSError:
+        return False
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(_HEAD)
 
 
 def binary(zero: int) -> str:

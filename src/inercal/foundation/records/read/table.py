@@ -84,7 +84,9 @@ class FirstLook:
 
     ``values`` (n, k) are its columns (text is NaN), ``names`` (k,) its header and ``units`` (k,) those stated
     beside the names, if any; ``leading`` holds the lines passed over by ``options.skip``. Columns ``numbered`` are
-    found by their number alone: their names stand in those lines. ``texts`` are columns, by index, of words.
+    found by their number alone: their names stand in those lines. ``texts`` are columns, by index, of words,
+    and ``stated`` what else the file says, a line each, such as ``Fs = 100``. ``origins`` (k,) are columns of
+    several arrays, looked at together.
     """
 
     values: Array
@@ -95,6 +97,8 @@ class FirstLook:
     units: tuple[str | None, ...] = ()
     numbered: bool = False
     texts: Mapping[int, tuple[str, ...]] = field(default_factory=dict, repr=False)
+    stated: tuple[str, ...] = ()
+    origins: tuple[Origin, ...] = ()
 
     @cached_property
     def times_named(self) -> Counter[str]:
@@ -103,6 +107,8 @@ class FirstLook:
 
     def origin(self, index: int) -> Origin:
         """The name of a column in a map."""
+        if self.origins:
+            return self.origins[index]
         if self.times_named:
             alone = not self.numbered and self.times_named[self.names[index]] == 1
             return self.names[index] if alone else index

@@ -24,7 +24,7 @@ from inercal.foundation.records.channels import Channel, may_be_empty
 from inercal.foundation.records.checks import too_long
 from inercal.foundation.records.places import counted, counted_names, places, shortened
 from inercal.foundation.records.read.layout import UNENDED, Block, TextLayout, blocks, find_layout, is_rounded
-from inercal.foundation.records.read.lying import on_its_side
+from inercal.foundation.records.read.lying import lies_on_its_side, look_at_its_side, on_its_side
 from inercal.foundation.records.read.rewriting import is_rewritten, with_layout
 from inercal.foundation.records.read.table import LARGEST, FileOptions, FirstLook, RawTable
 from inercal.foundation.records.read.time_stamps import seconds_of
@@ -38,6 +38,7 @@ _MOST_ODD = 4096
 _NO_LINES = np.empty(0, np.int64)
 _HEADER_LINES, _LAYOUT_LINES = 50, 400
 _TEXTS = 20  # columns of words
+_REST = "rest of t"
 
 
 @dataclass(frozen=True)
@@ -118,9 +119,6 @@ def read(
     return [RawTable(tuple(located), values, contents(layout), count, tuple(labels), findings)]
 
 
-_REST = "rest of t"
-
-
 def _in_words(t: Channel) -> bool:
     """True for times that are dates and times of day in words."""
     return bool(t.stamps and t.stamps.order)
@@ -156,6 +154,8 @@ def peek(path: Path) -> list[FirstLook]:
     """Look at the first 2 MB of a text file; lines before the header are found out."""
     with path.open("rb") as file:
         head = next(blocks(file, path))
+    if lies_on_its_side(head.lines):
+        return [look_at_its_side(path)]
     if (found := lines_found(head.lines)) is not None:
         block, _, layout = with_layout(iter([head]), found.options, found.named)
         first = _first_look(block, layout, found.options)

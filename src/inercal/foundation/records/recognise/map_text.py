@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -15,12 +14,10 @@ from inercal.foundation.errors import InputError, RecordError
 from inercal.foundation.records.channels import Origin, measures_motion, of_a_table, sensor_and_axis
 from inercal.foundation.records.maps import ASIDE, OPEN, RecordMap, check_answers, map_of
 from inercal.foundation.records.read import canonical_units
-from inercal.foundation.records.recognise.tables import FileGuess, look, samples_of
+from inercal.foundation.records.recognise.tables import FileGuess, look, rate_in, samples_of
 from inercal.foundation.records.recognise.units import EVERYDAY, quoted, units_of
 from inercal.foundation.records.titles import fits, is_unit
 from inercal.foundation.units import parse_quantity, shown
-
-_RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -78,6 +75,8 @@ def guess_map(
             table = f"file.{name}"
             lines += ["", f"[{table}]", f"path = {quoted(file.path.name)}", *_options(file, "")]
             lines += _columns(file, f"{table}.columns", answers)
+            stamps = [] if _one_kind(files) else _stamps(file)
+            lines += ["", f"[{table}.time]", *stamps] if stamps else []
     for file in files:
         lines += ["", *(f"# not used: {column}" for column in file.unused)] if file.unused else []
     if rate is not None and all("t" in file.guesses for file in files):
@@ -190,40 +189,51 @@ def _options(file: FileGuess, table: str) -> list[str]:
 
 
 def _time(files: Sequence[FileGuess], rate: str | None) -> list[str]:
-    """The table of the time as TOML: how stamps are read, and the rate where files have none.
-
-    Raises `RecordError` where two files have stamps of different kinds, which one map cannot say.
-    """
-    kinds = {file.guesses["t"].stamps: file for file in files if "t" in file.guesses}
-    if len(kinds) > 1:
-        raise RecordError(
-            list(kinds.values())[1].path, "has stamps of another kind, expected those of the first file"
-        )
-    lines: list[str] = []
+    """The table of the time as TOML: how stamps are read, and the rate where files have none."""
+    lines = _stamps(files[0]) if _one_kind(files) else []
     comment: list[str] = []
-    for stamps in filter(None, kinds):
-        lines += [f"stamps = {quoted(stamps.order)}"] if stamps.order else []
-        lines += [f"beside = {quoted(stamps.beside)}"] if stamps.beside is not None else []
-        lines += [f'rest = "{"ns" if stamps.rest < 1e-7 else "us"}"'] if stamps.rest else []
-        lines += [f"wrap = {stamps.wrap:.0f}"] if stamps.wrap else []
     if any("t" not in file.guesses and not of_a_table(file.guesses) for file in files):
-        comment, stated = _rate([line for file in files for line in file.leading], rate)
+        comment, stated = _rate([line for file in files for line in (*file.leading, *file.stated)], rate)
         lines += stated
     return ["", *comment, "[time]", *lines] if lines else []
+
+
+def _one_kind(files: Sequence[FileGuess]) -> bool:
+    """True where the stamps of all files are of one kind, which is said once."""
+    return len({file.guesses["t"].stamps for file in files if "t" in file.guesses}) < 2
+
+
+def _stamps(file: FileGuess) -> list[str]:
+    """Keys by which the stamps of a file are read, as TOML; none of plain numbers."""
+    stamps = file.guesses["t"].stamps if "t" in file.guesses else None
+    if stamps is None:
+        return []
+    lines = [f"stamps = {quoted(stamps.order)}"] if stamps.order else []
+    beside = list(stamps.beside) if isinstance(stamps.beside, tuple) else stamps.beside
+    lines += [f"beside = {quoted(beside)}"] if beside is not None else []
+    lines += [f'rest = "{"ns" if stamps.rest < 1e-7 else "us"}"'] if stamps.rest else []
+    return lines + ([f"wrap = {stamps.wrap:.0f}"] if stamps.wrap else [])
 
 
 def _rate(leading: Iterable[str], rate: str | None) -> tuple[list[str], list[str]]:
     """A comment on the sample rate of files without times, and the rate: as stated, or as a line of a file says."""
     if rate is not None:
         return ["# there is no time column"], [f"rate = {quoted(rate)}"]
-    sentence = next((line for line in leading if _RATE.search(line)), None)
-    match = _RATE.search(sentence) if sentence is not None else None
-    if sentence is not None and match:
+    sentence, stated = rate_in(leading)
+    if stated:
         return [f"# there is no time column; a line says {quoted(sentence[:60])}"], [
-            f'rate = "{match[1]} Hz"'
+            f'rate = "{_with_u(stated)} Hz"'
         ]
     comment = "# there is no time column: state the sample rate where times are needed, such as 100 Hz"
     return [comment], [f"rate = {quoted(OPEN)}"]
+
+
+def _with_u(rate: str) -> str:
+    """A rate that a file states, with its uncertainty: half its last digit, or 1 %, whichever is larger."""
+    digits = len(rate.partition(".")[2])
+    u = max(0.5 * 10.0**-digits, 0.01 * float(rate))
+    places = max(digits, 0 if u >= 1.0 else 2 if u < 0.1 else 1)
+    return f"{float(rate):.{places}f}({max(1, round(u * 10**places))})"
 
 
 def _table_names(files: Sequence[FileGuess]) -> list[str]:

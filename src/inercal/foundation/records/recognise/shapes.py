@@ -32,6 +32,10 @@ _CELL = re.compile(rf"\"?(?:{STAMP}|{NUMBER}|{NUMBER},\d+|nan)\"?", re.IGNORECAS
 _MESSAGES = {
     "VNIMU": "mag_x mag_y mag_z acc_x[m/s^2] acc_y[m/s^2] acc_z[m/s^2] gyro_x[rad/s] gyro_y[rad/s] gyro_z[rad/s] "
     "temperature[degC] pressure",
+    **dict.fromkeys(("RAWIMUA", "RAWIMUSA"), "week time[s] status acc_z -acc_y acc_x gyro_z -gyro_y gyro_x"),
+    **dict.fromkeys(
+        ("RAWIMUXA", "RAWIMUSXA"), "info type week time[s] status acc_z -acc_y acc_x gyro_z -gyro_y gyro_x"
+    ),
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -36,6 +36,7 @@ from inercal.foundation.records.titles import (
 )
 from inercal.foundation.units import parse_unit
 
+_RATE = re.compile(r"(?:\bfs|rate|freq\w*|hz)\b\W*(\d+(?:\.\d+)?)", re.IGNORECASE)
 _LISTED = 40
 _HOT = 200.0  # degC: beyond it a temperature without a unit is a count
 
@@ -52,6 +53,7 @@ class FileGuess:
     options: FileOptions = field(default_factory=FileOptions)
     titles: tuple[str, ...] = ()
     known: str = ""
+    stated: tuple[str, ...] = ()
 
 
 def samples_of(path: Path) -> Sequence[FirstLook]:
@@ -62,6 +64,11 @@ def samples_of(path: Path) -> Sequence[FirstLook]:
         raise RecordError(path, f"cannot be read ({error.strerror or error})") from error
 
 
+def rate_in(lines: Iterable[str]) -> tuple[str, str]:
+    """The first of some lines that states a sample rate, and the rate [Hz] as it is written; empty where none does."""
+    return next(((line, match[1]) for line in lines if (match := _RATE.search(line))), ("", ""))
+
+
 def look(
     path: Path, on_table: bool, of_model: bool, rate: float | None, chosen: Mapping[str, str]
 ) -> list[FileGuess]:
@@ -69,7 +76,11 @@ def look(
 
     ``chosen`` are names of columns by sensor, where it was asked which of several are meant.
     """
-    samples = sorted(samples_of(path), key=lambda sample: -len(sample.values))
+    samples = sorted(_together(samples_of(path)), key=lambda sample: -len(sample.values))
+    if rate is None and (
+        in_words := rate_in(line for each in samples for line in (*each.stated, *each.leading))[1]
+    ):
+        rate = float(in_words) or None
     lengths: dict[int, dict[str, Guess]] = {}
     for sample in samples:
         guesses = lengths.setdefault(len(sample.values), {})
@@ -79,13 +90,14 @@ def look(
             if named
             else _by_shape(sample, path, rate, chosen)
         ):
-            guesses.setdefault(guess.name, guess)
+            guesses.setdefault(guess.name, _scaled(guess, sample.leading))
     leading = tuple(line for sample in samples for line in sample.leading)
     longest, *others = lengths.values() or [{}]
     options = next((sample.options for sample in samples if sample.options.transpose), samples[0].options)
     titles = tuple(name.strip() for sample in samples for name in sample.names)
     known = next((words for sample in samples if (words := not_taken(sample, on_table))), "")
-    files = [FileGuess(path, longest, leading, options=options, titles=titles, known=known)]
+    stated = tuple(line for sample in samples for line in sample.stated)
+    files = [FileGuess(path, longest, leading, options=options, titles=titles, known=known, stated=stated)]
     for guesses in others:
         guessed = {name for file in files for name in file.guesses} - {"t"}
         new = {name: guess for name, guess in guesses.items() if name not in guessed}
@@ -94,6 +106,58 @@ def look(
     if all(np.isnan(sample.values).all() for sample in samples):
         raise RecordError(path, f"found {_held(samples) or 'nothing'}, expected columns of numbers")
     return [replace(files[0], unused=_unused(samples, files)), *files[1:]]
+
+
+def _together(samples: Sequence[FirstLook]) -> list[FirstLook]:
+    """Arrays of a file as one table where they are equally long, and each names its columns or is a triad of the sensor
+    that its name says: what one tells of the other is seen then."""
+    made: list[FirstLook] = []
+    for rows in dict.fromkeys(len(sample.values) for sample in samples):
+        alike = [sample for sample in samples if len(sample.values) == rows]
+        parts = [sample for sample in alike if sample.names or _is_triad(sample)]
+        if len(parts) < 2 or not any(map(_is_triad, parts)):
+            made += alike
+            continue
+        names = [sample.names or tuple(f"{sample.variable} {axis}" for axis in "xyz") for sample in parts]
+        units = [sample.units or (None,) * sample.values.shape[1] for sample in parts]
+        origins = [tuple(map(sample.origin, range(sample.values.shape[1]))) for sample in parts]
+        whole = replace(
+            parts[0],
+            values=np.hstack([sample.values for sample in parts]),
+            names=sum(names, ()),
+            units=sum(units, ()),
+            origins=sum(origins, ()),
+            variable="",
+        )
+        made += [whole, *(sample for sample in alike if not (sample.names or _is_triad(sample)))]
+    return made
+
+
+def _is_triad(sample: FirstLook) -> bool:
+    """True for three columns without names of an array whose own name says one sensor."""
+    return not sample.names and sample.values.shape[1] == 3 and len(sensors_named(sample.variable)) == 1
+
+
+def _scaled(guess: Guess, leading: Sequence[str]) -> Guess:
+    """A channel by the scale that a line of a Gyroflow log states before the rows."""
+    kinds = {"t": ("tscale", "s"), "gyro": ("gscale", "rad/s"), "acc": ("ascale", "g")}
+    key, unit = kinds.get(guess.name.partition("_")[0], ("", ""))
+    stated = next(
+        (match[1] for line in leading if (match := re.fullmatch(rf"\s*{key}\s*,\s*(\S+?),*\s*", line))), ""
+    )
+    if not key or not stated or not any("GYROFLOW" in line for line in leading):
+        return guess
+    try:
+        factor = float(stated)
+    except ValueError:
+        return guess
+    reason = f"{guess.reason.partition(';')[0]}; the file says {key} {stated}"
+    usable = np.isfinite(factor) and factor > 0.0
+    return (
+        replace(guess, unit=unit, factor=factor, grade="certain", reason=reason, question="")
+        if usable
+        else guess
+    )
 
 
 def _held(samples: Sequence[FirstLook]) -> str:
@@ -209,6 +273,10 @@ def _recognised(
                 what = replace(what, unit=stated.unit, grade="", question="")
             elif stated is not None and stated.origin == origin and stated.unit:
                 what = replace(what, unit=stated.unit)
+            if sample.names[index].startswith("-"):
+                what = replace(
+                    what, factor=-1.0, reason=f"{what.reason}; {quoted(sample.names[index])} is reversed"
+                )
             kept.append(what)
     return _aside(sample, called, kept if triads else [*kept, *_alone(sample, kept)])
 
