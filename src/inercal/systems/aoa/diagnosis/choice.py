@@ -121,8 +121,8 @@ def _densities(settings: AoaSettings) -> tuple[float, ...]:
 
 class _FilteredStretch(NamedTuple):
     """Results of the fusion of a stretch: the mean squared innovation ``nis`` after it has settled, each as far as the
-    gate lets it through, infinite where the angle was lost; rms (3,) ``flexure`` along z and x [m/s^2] and of the angular
-    acceleration [rad/s^2], infinite where none runs; and its ``state`` at the end."""
+    gate lets it through, infinite where the angle was lost; rms (3,) ``flexure`` along z and x [m/s^2] and of the
+    angular acceleration [rad/s^2], infinite where none runs; and its ``state`` at the end."""
 
     nis: float
     flexure: Array

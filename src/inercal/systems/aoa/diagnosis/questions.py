@@ -90,8 +90,9 @@ def signals(settings: AoaSettings, motion: PredictedMotion) -> SensorSignals:
 class SensorRanges(NamedTuple):
     """Ranges (N + 1, 1) of the sensors' predictions over a recording: the largest ``size``; over it the ``middle`` of
     their sizes, and the readings ``low`` and ``high`` beyond which they are at an end; the largest ``change`` per
-    second; ``wide`` 1 where they range over many times the noise of a reading, so that shapes mean something, else
-    0."""
+    second. Each 1 where it is many times the noise of a reading, so that it means something, else 0: how ``wide`` they
+    range, their ``load``, and the derivative of accelerometers by their ``axis`` (N, 1).
+    """
 
     size: Array
     middle: Array
@@ -99,6 +100,8 @@ class SensorRanges(NamedTuple):
     high: Array
     change: Array
     wide: Array
+    load: Array
+    axis: Array
 
     @classmethod
     def of(cls, signal: SensorSignals, noise: Array) -> SensorRanges:
@@ -108,8 +111,10 @@ class SensorRanges(NamedTuple):
         low, high = np.quantile(y, [0.15, 0.85], axis=1, keepdims=True)
         middle = np.median(np.abs(y), axis=1, keepdims=True)
         change = np.abs(signal.change).max(axis=1, keepdims=True)
-        wide = np.ptp(signal.y, axis=1, keepdims=True) > OF_JUDGE.least_range * noise
-        return cls(size, middle, low, high, change, wide.astype(float))
+        lean = np.abs(signal.axis).max(axis=1, keepdims=True)
+        sizes = (np.ptp(signal.y, axis=1, keepdims=True), size, lean)
+        shown = [(x > OF_JUDGE.least_range * noise[: len(x)]).astype(float) for x in sizes]
+        return cls(size, middle, low, high, change, *shown)
 
 
 @dataclass(eq=False)
@@ -129,14 +134,14 @@ class CourseMaker:
         x = np.array(list(_TURNS))[:, None] * motion.theta
         waves = np.vstack([np.cos(x), np.sin(x)])
         made = np.zeros((count * (3 * blocks + 27) + 2 * blocks + 24, len(block)))
-        row, at = np.arange(len(block)), 0
+        row, at, ranges = np.arange(len(block)), 0, self.ranges
         for i in range(count + 1):
-            for by in (1.0, of.y[i], *((of.axis[i],) if i < count else ())):
+            for by in (1.0, ranges.load[i] * of.y[i], *((ranges.axis[i] * of.axis[i],) if i < count else ())):
                 made[at + block, row] = by
                 at += blocks
             own: tuple[Array, ...] = (of.change[i],)
             if i < count:
-                own = (self.ranges.wide[-1] * of.position[i], of.gravity[i], of.yaw[i], of.roll[i])
+                own = (ranges.wide[-1] * of.position[i], of.gravity[i], of.yaw[i], of.roll[i])
             for rows in (waves, shapes[:, i], np.array(own)):
                 made[at : at + len(rows)] = rows
                 at += len(rows)
