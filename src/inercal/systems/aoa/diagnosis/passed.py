@@ -32,6 +32,9 @@ from inercal.systems.aoa.settings import AoaSettings
 
 ANGLE = "theta"
 
+_SLOW = 5
+"""Groups, a tenth of a second, over which vibration of low frequency shows."""
+
 _LOOK: Final = {
     "order": "Look for warm-up, a loose mount, or a supply that changed.",
     "place": "Look for a cable that pulls, a sting that bends, or an axis of a sensor that is not as stated.",
@@ -49,6 +52,8 @@ class AnglePass:
     ``ends`` (p, m) what it does to the coefficients ``names`` at the end, over their u. ``by_constants`` (p, p)
     products of the covariances of theta with the coefficients, mean after the settling time; ``by_gravity`` (1 + p,)
     change of theta, rms, and of the coefficients with gravity [m/s^2]. ``faded``: constants faded on the way.
+    ``slow`` (N + 1,) squares of innovations summed over `_SLOW` groups, of each sensor, and ``slow_count``, their
+    number.
     """
 
     names: tuple[str, ...]
@@ -59,6 +64,17 @@ class AnglePass:
     by_constants: Array
     by_gravity: Array
     faded: bool
+    slow: Array
+    slow_count: int
+
+    def chance(self, answer: PassAnswer) -> float:
+        """Chance of an answer where innovations that it leaves are larger than their noise over some groups: vibration
+        of low frequency that the model has not, such as a slight plunge, is no fault of a sensor."""
+        from scipy.special import chdtrc
+
+        explained = answer.score.explained
+        left = float(((self.slow - explained) / max(self.slow_count, 1)).max())
+        return float(chdtrc(answer.score.degrees, explained / max(left, 1.0)))
 
     def reach(self, columns: ErrorColumns) -> Array:
         """Shift (1 + p, k) of theta, rms, and of the coefficients by one unit of each column, in u."""
@@ -97,6 +113,7 @@ def pass_of(
     squares, count, across = 0.0, 0, np.zeros(m)
     products, of_angle, settled = np.zeros((m, m)), np.zeros((m, m)), 0
     by_constants, lean = np.zeros((len(at), len(at))), 0.0
+    slow, slow_count = np.zeros(channels), 0
     longest = max(head.rows.stop - head.rows.start for head in trace.heads)
     memory = loop.memory(longest, n, len(problem.places.moving), problem.count)
     out, dt = np.empty((longest, loop.OUTPUTS + channels)), np.diff(t, prepend=t[:1])
@@ -125,7 +142,11 @@ def pass_of(
             seen = np.add.reduceat(read.astype(float), first, axis=0)
             root = np.sqrt(np.maximum(seen, 1.0))
             begun = k[first] >= start + LIMITS.starting_rows
-            white = (z / root)[begun].ravel()
+            of_groups = (z / root)[begun]
+            whole = of_groups[: len(of_groups) // _SLOW * _SLOW].reshape(-1, _SLOW, channels).sum(axis=1)
+            slow += np.sum(np.square(whole), axis=0) / _SLOW
+            slow_count += len(whole)
+            white = of_groups.ravel()
             columns = (X / root[:, :, None])[begun].reshape(-1, m).astype(np.float32)
             squares += float(white @ white)
             count += int((seen[begun] > 0.0).sum())
@@ -154,6 +175,8 @@ def pass_of(
         by_constants / settled,
         by_gravity,
         any(head.F is not None for head in trace.heads),
+        slow,
+        slow_count,
     )
 
 
@@ -163,7 +186,9 @@ def heard(passed: AnglePass) -> Finding | None:
     def shifts(answer: PassAnswer) -> Array:
         return passed.shift(answer.question.columns, answer.score.b)
 
-    return speaking(passed.sums, *answers(passed.sums, passed.questions), passed.names, shifts, _LOOK)
+    hits, limit = answers(passed.sums, passed.questions)
+    hits = [hit for hit in hits if passed.chance(hit) < limit]
+    return speaking(passed.sums, hits, limit, passed.names, shifts, _LOOK)
 
 
 def hidden(passed: AnglePass) -> list[Finding]:
