@@ -13,11 +13,11 @@ from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.foundation.results.files import from_json, to_json
 from inercal.foundation.units import Quantity, parse_unit
 from inercal.systems.aoa.angles import Angles
+from inercal.systems.aoa.diagnosis.passed import pass_of
 from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.motion import MotionPlan
 from inercal.systems.aoa.reading.wind_off_zero import with_zero
-from inercal.systems.aoa.result import budget
 from inercal.systems.aoa.result.budget import parts
 from inercal.systems.aoa.result.outcome import assemble, assemble_angles
 from inercal.systems.aoa.result.systematic import by_fusion, by_methods
@@ -316,13 +316,15 @@ def test_a_zero_lowers_u_of_the_angle():
     assert share["stated zero"] > 0.0
 
 
-def test_parts_of_priors_from_one_run_are_those_of_runs_with_larger_ones(monkeypatch):
-    """P_s = P Pi^-1 Pi_s Pi^-1 P of constants, against q_s dP/dq_s of the filter run again for each."""
-    settings = study(motion=SINE)
+def test_parts_of_priors_and_gravity_by_the_pass_are_those_of_runs_with_larger_ones():
+    """P_s = P Pi^-1 Pi_s Pi^-1 P of constants, against q_s dP/dq_s of the filter run again for each; and gravity off
+    by its uncertainty."""
+    settings = replace(study(motion=SINE), site=UNCERTAIN)
     recording = simulate(settings, np.random.default_rng(3)).recording
     of, answered = problem(settings), np.ones(len(recording.t), dtype=bool)
-    quick = parts(recording, of, settings, False, answered).budget
-    monkeypatch.setattr(budget, "_of_priors", lambda *_: {})
+    found = estimate(recording, of)
+    by_pass = pass_of(recording, of, settings, found)
+    quick = parts(recording, of, settings, False, answered, found, by_pass).budget
     slow = parts(recording, of, settings, False, answered).budget
     assert [item.source for item in quick] == [item.source for item in slow]
     for one, other in zip(quick, slow, strict=True):

@@ -12,9 +12,9 @@ import inercal as ic
 from inercal.examples import FOLDER
 from inercal.faces.studies.selfcal import selfcal_study
 from inercal.foundation.findings import Status
+from inercal.foundation.inference.asked_pass import answers
 from inercal.foundation.inference.scores import ErrorColumns
 from inercal.systems.selfcal.before.bounds import SOURCES, recorded_bounds
-from inercal.systems.selfcal.diagnosis.judged import answers
 from inercal.systems.selfcal.diagnosis.passed import pass_of
 from inercal.systems.selfcal.filters import error_state, whitened
 from inercal.systems.selfcal.filters.problem import problem

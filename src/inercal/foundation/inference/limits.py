@@ -12,6 +12,9 @@ class Limits:
     question_risk: float = 5e-3
     """Probability that any question names something in a sound fit: with all else that is asked one percent."""
 
+    filter_risk: float = 1e-2
+    """The same where a filter asks, whose real risk is near it; of all that is asked of a recording."""
+
     order_risk: float = 1e-3
     """Probability that another order of the rows is named in a sound fit."""
 

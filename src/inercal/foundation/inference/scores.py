@@ -43,7 +43,8 @@ class ErrorColumns:
 
 class ErrorScore(NamedTuple):
     """Answer of a pass about an error: ``degrees``, combinations that show; ``chance`` that a sound record explains as
-    much, ``explained`` sum of squares, sizes ``b`` (k,) with ``u`` (k,), and the ``shift`` (p,) of the values by it."""
+    much, ``explained`` sum of squares, sizes ``b`` (k,) with ``u`` (k,), and the ``shift`` (p,) of the values by it;
+    ``ways`` (k, degrees) the combinations, each of information 1."""
 
     degrees: int
     chance: float
@@ -51,6 +52,7 @@ class ErrorScore(NamedTuple):
     b: Array
     u: Array
     shift: Array
+    ways: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +191,9 @@ class PassSums:
         explained = float(along @ (along / strength))
         b, count = ways @ (along / strength), int(shown.sum())
         u = np.sqrt(np.square(ways) @ (1.0 / strength))
-        return ErrorScore(count, float(chdtrc(count, explained)), explained, b, u, reach @ b)
+        return ErrorScore(
+            count, float(chdtrc(count, explained)), explained, b, u, reach @ b, ways / np.sqrt(strength)
+        )
 
 
 def joined(errors: Sequence[ErrorColumns]) -> ErrorColumns:

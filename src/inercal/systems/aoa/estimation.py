@@ -12,8 +12,8 @@ from inercal.systems.aoa.angles import Angles
 from inercal.systems.aoa.diagnosis.choice import of_delay
 from inercal.systems.aoa.diagnosis.effect import of_flexure
 from inercal.systems.aoa.diagnosis.examination import diagnose
+from inercal.systems.aoa.diagnosis.passed import AnglePass, heard, hidden, pass_of
 from inercal.systems.aoa.diagnosis.spectrum import of_rectification
-from inercal.systems.aoa.diagnosis.unmodelled import unmodelled
 from inercal.systems.aoa.estimators import EstimatorKind
 from inercal.systems.aoa.fusion import filter_result, live_band, smoother
 from inercal.systems.aoa.fusion.band import fused_case
@@ -46,11 +46,13 @@ class PreparedRecording:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredAngles:
-    """The ``angles`` of a case, further ``findings``, and errors of the sensors as ``filtered``, None without them."""
+    """The ``angles`` of a case, further ``findings``, and errors of the sensors as ``filtered``, with the pass that
+    judged them; None without them."""
 
     angles: Angles
     findings: tuple[Finding, ...] = ()
     filtered: FusionResult | None = None
+    passed: AnglePass | None = None
 
 
 @dataclass(frozen=True)
@@ -84,12 +86,16 @@ def _fusion(case: PreparedRecording, progress: Progress) -> MeasuredAngles:
     findings = diagnose(*fused_case(zeroed, settings), case.findings, settings.band.every)
     said = (*case.findings, *findings)
     named = any(finding.harm and not finding.code.endswith("_scatter") for finding in said)
-    findings = [*findings, *of_delay(case.delay, of, filtered), *unmodelled(zeroed, of, settings, named)]
+    passed = pass_of(zeroed, of, settings, filtered)
+    findings = [*findings, *of_delay(case.delay, of, filtered)]
+    if passed is not None:
+        shown = None if named else heard(passed)
+        findings += [*(() if shown is None else (shown,)), *hidden(passed)]
     findings += of_flexure(zeroed, of, filtered, settings)
     known_u = angles.u[np.isfinite(angles.u)]
     if len(known_u):
         findings += of_rectification(case.recording, settings, float(np.median(known_u)))
-    return MeasuredAngles(angles, tuple(findings), filtered)
+    return MeasuredAngles(angles, tuple(findings), filtered, passed)
 
 
 def _fusion_alone(recording: Recording, settings: AoaSettings) -> Angles:

@@ -15,6 +15,12 @@ class Limits:
     judged_rows: int = 6000
     """Rows of the liveliest stretch, which is judged in the place of the whole."""
 
+    summed_time: float = 0.02
+    """Time [s] over which whitened innovations are summed for the judge: motion is slower."""
+
+    ranged_rows: int = 5000
+    """Rows by which the range of each sensor is told, at most twice as many."""
+
     white_log: float = 0.53
     """Mean of log(1 + v^2) of white innovations v of variance 1."""
 
@@ -334,16 +340,10 @@ class Limits:
     """Chance of a sound recording above that limit, where few innovations scatter."""
 
     unseen_scale: float = 0.01
-    """Error of the gyro's scale [1] that is tried: of a gyro that was never calibrated."""
+    """Standard deviation of a gyro's scale [1] that was never calibrated."""
 
     other_scale_sigmas: float = 2.0
     """Standard deviations by which a gyro's scale contradicts the usual prior, so that a wider one is taken."""
-
-    unseen_drift: float = 1e-3 * STANDARD_GRAVITY
-    """Drift [m/s^2] of an accelerometer's bias over a stretch that is tried: of a sensor that warms up."""
-
-    unseen_sigmas: float = 2.0
-    """Standard uncertainties by which it then shifts the angle, to be told."""
 
     flexure_ratio: float = 5.0
     """Root mean square of the sting's flexure, over the noise of a sample, from which it counts."""
@@ -365,15 +365,6 @@ class Limits:
 
     impossible_arm: float = 10.0
     """Lever arm [m] that is named whatever the motion shows of it: no tunnel has room for it."""
-
-    alike_errors: int = 3
-    """Errors told at most as equally possible: each is a run of the filter."""
-
-    alike_squares: float = 4.0
-    """Difference of the sums of squared innovations under two errors of which neither is likelier."""
-
-    unseen_axis: float = math.radians(0.05)
-    """Turn of an accelerometer's axis [rad] that is tried: of a mount that was made, and not measured."""
 
     clipped_part: float = 0.01
     """Part of the rows of a point from which clipped ones are told."""

@@ -144,7 +144,7 @@ def measure(
     if filtered is None:
         estimate = assemble_angles(recording, settings, angles, *behind)
     else:
-        estimate = assemble(zeroed, settings, of, filtered, *behind, angles=angles)
+        estimate = assemble(zeroed, settings, of, filtered, *behind, angles=angles, passed=found.passed)
     estimate = replace(estimate, timing={"solve": time.perf_counter() - clock})
     return Measurement(
         estimate, settings, of, recording, angles, filtered, at_rest, delay, judged, verified, compared

@@ -13,10 +13,6 @@ class Limits:
     risk: float = 1e-3
     """Accepted probability of a false finding, of each kind."""
 
-    question_risk: float = 1e-2
-    """Accepted probability that any question of the judge names something in a sound recording; the real one is near it
-    for a filter."""
-
     place_turn: float = math.radians(10.0)
     """Turn [rad] of a joint from which readings are asked whether they depend on its angle."""
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import islice, pairwise
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from inercal.systems.aoa.fusion import band as limiting
 from inercal.systems.aoa.fusion.filter_result import FusionResult
 from inercal.systems.aoa.fusion.loop import OUTPUTS
 from inercal.systems.aoa.fusion.problem import FusionProblem, problem
-from inercal.systems.aoa.fusion.run import advance, initial
+from inercal.systems.aoa.fusion.run import FusionState, advance, initial
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.paper.delay import Delay, relative_delay
 from inercal.systems.aoa.reading.recording import Recording, in_time
@@ -80,7 +80,7 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     stretches = [part_of(recording, rows) for rows in liveliest(recording)]
     if not stretches:
         return plain
-    fair = _fair(stretches[0], settings)
+    fair, runs = _fair(stretches[0], settings), _StretchRuns(stretches)
     bands = (plain.band, *(() if stated else _bands(stretches[0], fair)))
     # lines first: a snap that is large enough may take pick-up for motion
     attempts = [(each, 1) for each in bands if not each.corner < math.inf]
@@ -89,12 +89,14 @@ def decided_with(recording: Recording, settings: AoaSettings, delay: Delay | Non
     for prior in (settings.prior, *_shaken(settings.prior)):
         for band, most in attempts:
             tried = replace(fair, band=band, prior=prior)
-            if (density := _density(recording, stretches, tried, densities, most)) is not None:
+            if (density := _density(recording, runs, tried, densities, most)) is not None:
                 fitting = _with_snap(replace(settings, band=band, prior=prior), density)
+                states = [runs.of(number, fitting).state for number in range(len(stretches))]
+                of = problem(fitting, recording.spatial)
                 # under the liveliest model nothing is left to tell flexure by
                 lively = density == DENSITIES[-1]
-                fitting = fitting if lively else _calmer(stretches, settings.prior, fitting)
-                return gyro_scale.of_recording(stretches, fitting)
+                fitting = fitting if lively else _calmer(runs, settings.prior, fitting)
+                return gyro_scale.of_recording(stretches, states, of, fitting)
     return plain
 
 
@@ -117,12 +119,53 @@ def _densities(settings: AoaSettings) -> tuple[float, ...]:
     return tuple(least * 10.0**k for k in range(steps))
 
 
+class _FilteredStretch(NamedTuple):
+    """Results of the fusion of a stretch: the mean squared innovation ``nis`` after it has settled, each as far as the
+    gate lets it through, infinite where the angle was lost; rms (3,) ``flexure`` along z and x [m/s^2] and of the
+    angular acceleration [rad/s^2], infinite where none runs; and its ``state`` at the end."""
+
+    nis: float
+    flexure: Array
+    state: FusionState
+
+
+class _StretchRuns:
+    """Runs of the fusion of stretches, each once."""
+
+    def __init__(self, stretches: Sequence[Recording]) -> None:
+        self.stretches = stretches
+        self._known: dict[tuple[object, ...], _FilteredStretch] = {}
+
+    def of(self, number: int, settings: AoaSettings) -> _FilteredStretch:
+        """The run of a stretch under a study."""
+        of = problem(settings, self.stretches[number].spatial)
+        key = number, of.constants, of.band, of.covariance.tobytes(), of.mean.tobytes()
+        if key not in self._known:
+            self._known[key] = _filtered(of, self.stretches[number])
+        return self._known[key]
+
+
+def _filtered(of: FusionProblem, part: Recording) -> _FilteredStretch:
+    """The fusion of a stretch."""
+    part, of = limiting.fused(part, of)
+    t, rows = part.t, part.rows
+    kept = np.full((len(t), 2 * of.size), np.nan)
+    state, trace = advance(initial(of), of, t, rows, kept, last=True)
+    settled = t[: len(trace.out)] - t[:1] >= LIMITS.settling_time
+    innovations = trace.out[settled, OUTPUTS:]
+    finite = innovations[np.isfinite(innovations)]
+    lost = np.isnan(trace.out[-1:, 0]).any() or len(trace.starts) > 1
+    nis = np.inf if lost or not finite.size else float(np.minimum(finite**2, of.constants.gate).mean())
+    flexure, at = np.full(3, np.inf), of.places.resonators
+    if at >= 0:
+        found = kept[: len(settled)][settled][:, [at + 1, at + 3, 2]]
+        found = found[np.isfinite(found).all(axis=1)]
+        flexure = np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else flexure
+    return _FilteredStretch(nis, flexure, state)
+
+
 def _density(
-    recording: Recording,
-    stretches: Sequence[Recording],
-    tried: AoaSettings,
-    densities: Sequence[float],
-    most: int,
+    recording: Recording, runs: _StretchRuns, tried: AoaSettings, densities: Sequence[float], most: int
 ) -> float | None:
     """The smallest of the first ``most`` densities under which all stretches fit, and which a larger one does not
     better; None of none."""
@@ -130,9 +173,9 @@ def _density(
 
     @cache
     def largest(density: float) -> float:
-        of, worst = problem(_with_snap(tried, density), recording.spatial), 0.0
-        for part in stretches:
-            worst = max(worst, _nis(of, part))
+        of, worst = _with_snap(tried, density), 0.0
+        for number in range(len(runs.stretches)):
+            worst = max(worst, runs.of(number, of).nis)
             if not worst < limit:  # the others would not make it better
                 return math.inf
         return worst
@@ -151,7 +194,7 @@ def _density(
     return None
 
 
-def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings) -> AoaSettings:
+def _calmer(runs: _StretchRuns, stated: Prior, settings: AoaSettings) -> AoaSettings:
     """The study with less flexure in each direction in which the fusion finds a tenth of what is allowed at most, in
     all stretches, and again with what is allowed then, where the ``stated`` prior is the usual one: what is allowed for
     and is not there costs u, most at rest.
@@ -162,7 +205,8 @@ def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings
     usual, prior = Prior(), settings.prior
     if not _usual_flexure(stated) or settings.estimator.states < 15:
         return settings
-    z, x, acceleration = np.max([_flexure(part, settings) for part in stretches], axis=0).tolist()
+    found = [runs.of(number, settings).flexure for number in range(len(runs.stretches))]
+    z, x, acceleration = np.max(found, axis=0).tolist()
     moved = math.hypot(prior.lever_common, prior.lever) * acceleration
 
     def calm(each: R, before: Resonance, rms: float) -> R:
@@ -175,17 +219,6 @@ def _calmer(stretches: Sequence[Recording], stated: Prior, settings: AoaSettings
 
     heave, axial = calm(prior.heave, usual.heave, z), calm(prior.axial, usual.axial, x)
     return replace(settings, prior=replace(prior, heave=heave, axial=axial))
-
-
-def _flexure(part: Recording, settings: AoaSettings) -> Array:
-    """Rms (3,) that the fusion of a stretch finds of the flexure along z and x [m/s^2] and of the angular acceleration
-    [rad/s^2]; infinite where none runs."""
-    part, of = limiting.fused(part, problem(settings, part.spatial))
-    kept, at = np.full((len(part.t), 2 * of.size), np.nan), of.places.resonators
-    advance(initial(of), of, part.t, part.rows, kept, last=True)
-    found = kept[part.t - part.t[:1] >= LIMITS.settling_time][:, [at + 1, at + 3, 2]]
-    found = found[np.isfinite(found).all(axis=1)]
-    return np.sqrt(np.mean(np.square(found), axis=0)) if len(found) else np.full(3, np.inf)
 
 
 def _usual_flexure(prior: Prior) -> bool:
@@ -341,17 +374,6 @@ def _bands(part: Recording, settings: AoaSettings) -> Iterator[Band]:
             yield band
 
 
-def _nis(of: FusionProblem, part: Recording) -> float:
-    """Mean squared innovation after the filter has settled, each as far as the gate lets it through."""
-    part, of = limiting.fused(part, of)
-    t, rows = part.t, part.rows
-    _, trace = advance(initial(of), of, t, rows, last=True)
-    innovations = trace.out[t[: len(trace.out)] - t[:1] >= LIMITS.settling_time, OUTPUTS:]
-    finite = innovations[np.isfinite(innovations)]
-    lost = np.isnan(trace.out[-1:, 0]).any() or len(trace.starts) > 1
-    return np.inf if lost or not finite.size else float(np.minimum(finite**2, of.constants.gate).mean())
-
-
 def _still(recording: Recording, settings: AoaSettings) -> float:
     """The same of a still model with the study's noise, sampled as the recording was by the sensors that it has."""
     step = recording.interval
@@ -367,4 +389,4 @@ def _still(recording: Recording, settings: AoaSettings) -> float:
         gyro[:] = np.nan
     none = np.full((len(t), 2), np.nan)
     still = Recording(t, acc, gyro, np.column_stack(turns) if recording.spatial else none, none)
-    return _nis(problem(settings, recording.spatial), still)
+    return _filtered(problem(settings, recording.spatial), still).nis

@@ -26,8 +26,10 @@ from inercal.systems.aoa.diagnosis.effect import of_noise
 from inercal.systems.aoa.diagnosis.fit_quality import Case, FitQuality, fit_quality, stretch
 from inercal.systems.aoa.diagnosis.gross import OTHER_CHANNEL, gross_faults
 from inercal.systems.aoa.diagnosis.noise_check import misstated
+from inercal.systems.aoa.diagnosis.passed import heard, pass_of
 from inercal.systems.aoa.diagnosis.small import small_errors
 from inercal.systems.aoa.estimators import STATES
+from inercal.systems.aoa.fusion.filter_result import estimate
 from inercal.systems.aoa.fusion.problem import problem
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later
@@ -160,7 +162,10 @@ def _on_its_back(recording: Recording, settings: AoaSettings) -> list[Finding]:
 
 
 def diagnose(
-    recording: Recording, settings: AoaSettings, gross: Sequence[Finding] | None = None, every: int = 1
+    recording: Recording,
+    settings: AoaSettings,
+    gross: Sequence[Finding] | None = None,
+    every: int = 1,
 ) -> list[Finding]:
     """Name the faults of a recording; none for a sound one, nor for one with gross faults.
 
@@ -228,12 +233,15 @@ def _too_small(part: Recording, settings: AoaSettings) -> list[Finding]:
 
 
 def _errors(part: Recording, settings: AoaSettings, now: FitQuality) -> list[Finding]:
-    """Constant errors that make the recording fit; a contradiction where none do."""
+    """Constant errors that make the recording fit; what the judge hears where none do, or a contradiction."""
     errors, left = small_errors((part, settings))
     then = fit_quality(*left)
     if then.fits or then.misfit <= LIMITS.sound_misfit:
         return [each.finding for each in errors]
-    return [_contradiction(part, settings, now)]
+    of = problem(replace(settings, estimator=replace(settings.estimator, states=19)), part.spatial)
+    passed = pass_of(part, of, settings, estimate(part, of))
+    said = None if passed is None else heard(passed)
+    return [_contradiction(part, settings, now) if said is None or not said.harm else said]
 
 
 def _contradiction(part: Recording, settings: AoaSettings, now: FitQuality) -> Finding:

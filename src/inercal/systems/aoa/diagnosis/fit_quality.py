@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,9 +121,24 @@ def _deviation(x: Array) -> float:
 
 
 def fit_quality(recording: Recording, settings: AoaSettings, states: States = 19) -> FitQuality:
-    """Filter a stretch whose time goes on."""
+    """Filter a stretch whose time goes on; of the last studies that were asked of it it is known."""
     asked = replace(settings, estimator=replace(settings.estimator, states=states))
-    posed = problem(asked, recording.spatial)
+    posed, known = problem(asked, recording.spatial), _qualities(recording)
+    key = posed.covariance.tobytes(), posed.mean.tobytes(), posed.geometry.tobytes(), posed.constants
+    if key not in known:
+        known.clear()
+        known[key] = _fit_quality(recording, settings, posed)
+    return known[key]
+
+
+@remembered
+def _qualities(_: Recording) -> dict[Hashable, FitQuality]:
+    """The quality of the last fit of a recording."""
+    return {}
+
+
+def _fit_quality(recording: Recording, settings: AoaSettings, posed: FusionProblem) -> FitQuality:
+    """Filter a stretch whose time goes on."""
     with np.errstate(all="ignore"):
         state, outputs = _followed(posed, recording.t, recording.rows)
         still = rms(outputs[:, 2]) < settings.noise.gyro

@@ -52,26 +52,6 @@ def small_errors(case: Case) -> tuple[Fits[Case], Case]:
     return search(case, constant_errors, JUDGE, 1.0, LIMITS.small_errors, choose=_most_explaining)
 
 
-def beside_a_scale(case: Case, other: Case) -> Fitted[Case] | None:
-    """The constant error that is not one of the gyro and explains a case best, whether the case fits or not; None where
-    none is likelier than the ``other`` case, that of another scale of the gyro.
-
-    Innovations of a filter are independent, so likelihoods differ by half the difference of the sums of their squares,
-    but for their variances, which are nearly the same.
-    """
-
-    def likeliest(_: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
-        return _least(itertools.islice(fits, LIMITS.alike_errors + 1), _squares, LIMITS.alike_squares)
-
-    found, then = search(case, _beside_the_gyro, JUDGE, 1.0, 1, choose=likeliest)
-    return found[-1] if found and _squares(then) < _squares(other) else None
-
-
-def _squares(case: Case) -> float:
-    """Sum of the squared innovations over their variances; a wild one, or one of a lost angle, counts as large."""
-    return float(np.nan_to_num(np.square(JUDGE.residuals(case)), nan=LIMITS.wild_ratio**2).sum())
-
-
 def _most_explaining(case: Case, fits: Iterator[Fits[Case]]) -> Fits[Case] | None:
     """The fit with the least misfit; None where it takes too little away."""
     best = _least(fits, JUDGE.misfit, LIMITS.small_alike_misfit)

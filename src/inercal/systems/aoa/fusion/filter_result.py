@@ -26,7 +26,7 @@ from inercal.systems.aoa.fusion.ahead import between, carried_on
 from inercal.systems.aoa.fusion.band import BandFilter
 from inercal.systems.aoa.fusion.loop import MOTION, NO_MOTIONS, OUTPUTS
 from inercal.systems.aoa.fusion.problem import FusionProblem
-from inercal.systems.aoa.fusion.run import FilterStart, FusionState, FusionTrace, advance, initial
+from inercal.systems.aoa.fusion.run import FilterStart, FusionState, FusionTrace, Head, advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later
@@ -52,7 +52,7 @@ class FusionResult:
     ``state`` of the causal filter at the end. ``nis_mean`` is the mean of ``nis_count`` squared innovations, single
     spikes as far as the gate lets them through, after the first 2 s, or in the later half of less than 4 s. ``starts``
     are the rows at which the filter started, more than one where the angle was lost; ``seconds`` the time of the
-    computation alone.
+    computation alone. ``trace`` of the causal filter, of the rows that are fused, with heads of blocks.
     """
 
     theta: Array
@@ -70,6 +70,7 @@ class FusionResult:
     starts: tuple[int, ...]
     smoothed: bool
     seconds: float
+    trace: FusionTrace
     roll: Array | None = None
     roll_u: Array | None = None
 
@@ -176,6 +177,7 @@ def _estimate(
         starts=tuple(int(taken[each.row]) for each in trace.starts),
         smoothed=smoothed,
         seconds=seconds,
+        trace=trace,
         roll=None if rolls is None else rolls[:, 0],
         roll_u=None if rolls is None else rolls[:, 1],
     )
@@ -214,23 +216,29 @@ def _causal(
     """
     state, done, t = initial(problem), 0, recording.t
     starts: list[FilterStart] = []
+    heads: list[Head] = []
     out = np.empty((len(t), OUTPUTS + problem.count + 1))
     rolls = np.empty((len(t), 2)) if problem.spatial else None
     for a in range(0, max(1, len(t)), _BLOCK):
         b, held = min(a + _BLOCK, len(t)), len(state.held)
         rows, last, moved = recording.of(slice(a, b)).rows, b == len(t), motions[a - held : b]
         if rolls is None:
-            state, trace = advance(state, problem, t[a:b], rows, kept, every, last, moved, first=done)
+            state, trace = advance(
+                state, problem, t[a:b], rows, kept, every, last, moved, block=BLOCK, first=done
+            )
         else:
             states = np.full((held + b - a, 2 * problem.size), np.nan)
-            state, trace = advance(state, problem, t[a:b], rows, states, 1, last, moved)
+            state, trace = advance(state, problem, t[a:b], rows, states, 1, last, moved, block=BLOCK)
             each = states[-done % every : len(trace.out) : every]
             kept[-(-done // every) :][: len(each)] = each
             rolls[done : done + len(trace.out)] = roll_of(problem, states[: len(trace.out)])
         starts += [each._replace(row=each.row + done) for each in trace.starts]
+        heads += [
+            head._replace(rows=slice(head.rows.start + done, head.rows.stop + done)) for head in trace.heads
+        ]
         out[done : done + len(trace.out)] = trace.out
         done += len(trace.out)
-    return state, FusionTrace(out[:done], tuple(starts)), rolls
+    return state, FusionTrace(out[:done], tuple(starts), tuple(heads)), rolls
 
 
 def fusion_label(smoothed: bool, states: int) -> str:

@@ -17,7 +17,7 @@ as long as no constant wanders or fades, and the angle is from the rows before. 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.budget import BudgetItem
-from inercal.systems.aoa.fusion import loop
+from inercal.systems.aoa.diagnosis.passed import AnglePass
 from inercal.systems.aoa.fusion.band import fused
+from inercal.systems.aoa.fusion.filter_result import FusionResult
 from inercal.systems.aoa.fusion.problem import FusionProblem
 from inercal.systems.aoa.fusion.problem import problem as stated_problem
-from inercal.systems.aoa.fusion.run import FusionTrace, advance, initial
+from inercal.systems.aoa.fusion.run import advance, initial
 from inercal.systems.aoa.fusion.smoother import BLOCK, smooth
 from inercal.systems.aoa.limits import LIMITS
 from inercal.systems.aoa.reading.recording import Recording, later
@@ -81,31 +82,41 @@ class AngleVariances:
 
 
 def parts(
-    recording: Recording, problem: FusionProblem, settings: AoaSettings, smoothed: bool, answered: Mask
+    recording: Recording,
+    problem: FusionProblem,
+    settings: AoaSettings,
+    smoothed: bool,
+    answered: Mask,
+    filtered: FusionResult | None = None,
+    passed: AnglePass | None = None,
 ) -> AngleVariances:
     """Split the uncertainty of the fusion by source.
 
     ``smoothed``: the angle is from all of the rows; the coefficients at the end are the same. ``answered`` (n,) marks
-    the rows with an angle; those before the first, as where sensors are switched on late, are left out.
+    the rows with an angle; those before the first, as where sensors are switched on late, are left out. What is
+    ``filtered`` already, with the judge's pass, is not filtered again.
     """
     first = recording.t[np.argmax(answered)]
     limited, problem = fused(recording, problem)
     if limited is not recording:
         recording, answered = limited, limited.t >= first
     taken = later(recording.t)
-    taken = taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
+    known = None if smoothed or filtered is None or passed is None else _known(filtered, taken)
+    if known is None:
+        passed, taken = None, taken[taken >= np.argmax(answered)][: MOST // 2 if smoothed else MOST]
     t, rows = recording.t[taken], recording.of(taken).rows
     settled = answered[taken] & (t - t[:1] >= LIMITS.settling_time)
     judged = settled if settled.any() else answered[taken]
     at = list(problem.nuisances.values())
     of = sources(problem, settings)
-    plain = _run(problem, t, rows, smoothed, judged, heads=True)
-    priors = {} if smoothed else _of_priors(problem, t, rows, judged, of, plain.trace)
+    plain = _run(problem, t, rows, smoothed, judged) if known is None else known(judged)
+    priors = {} if passed is None else _of_priors(problem, of, passed, plain)
     rerun = [source for source in of[:-1] if source.name not in priors]
     changed = [_enlarged(problem, rows, source) for source in rerun]
     # neither gravity nor a stated roll is a state of the filter: their errors move the estimate
     changes = leans(settings, problem.spatial)
-    moved = [(leaning(problem, each, settings), rows) for each in changes]
+    run_again = [lean for lean in changes if passed is None or lean.name != "gravity"]
+    moved = [(leaning(problem, lean, settings), rows) for lean in run_again]
     with ThreadPoolExecutor() as pool:
         cases = [*changed, *moved]
         others = list(pool.map(lambda case: _run(case[0], t, case[1], smoothed, judged), cases))
@@ -118,9 +129,14 @@ def parts(
     variances: list[tuple[BudgetSource, Array]] = [(source, parts_of[source.name]) for source in of]
     shifts: list[tuple[BudgetSource, Array]] = []
     by_gravity: Array | None = None
-    for lean, run in zip(changes, others[len(rerun) :], strict=True):
-        apart = (run.theta - plain.theta)[np.isfinite(run.theta - plain.theta)]
-        slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (run.x - plain.x)[at]) / lean.step
+    runs = iter(others[len(rerun) :])
+    for lean in changes:
+        if passed is not None and lean.name == "gravity":
+            slope = passed.by_gravity
+        else:
+            run = next(runs)
+            apart = (run.theta - plain.theta)[np.isfinite(run.theta - plain.theta)]
+            slope = np.append(float(np.sqrt(np.mean(np.square(apart)))), (run.x - plain.x)[at]) / lean.step
         if lean.name == "gravity":
             by_gravity = slope[1:]
             shifts += [
@@ -137,49 +153,41 @@ def parts(
     return AngleVariances(_items(variances, (ANGLE, *problem.nuisances)), common, by_gravity)
 
 
+def _known(filtered: FusionResult, taken: NDArray[np.int64]) -> Callable[[Mask], _BudgetRun] | None:
+    """The run over all rows ``taken`` of what is filtered, by the rows that are judged; None where these are many."""
+    trace, state = filtered.trace, filtered.state
+    if len(taken) > MOST or len(trace.out) != len(taken) or len(trace.starts) != 1:
+        return None
+
+    def run(judged: Mask) -> _BudgetRun:
+        u = trace.out[judged & np.isfinite(trace.out[:, 1]), 1]
+        return _BudgetRun(float(np.mean(np.square(u))), state.P, state.x, trace.out[judged, 0])
+
+    return run
+
+
 def _of_priors(
-    problem: FusionProblem,
-    t: Array,
-    rows: Array,
-    judged: Mask,
-    of: Sequence[BudgetSource],
-    trace: FusionTrace,
+    problem: FusionProblem, of: Sequence[BudgetSource], passed: AnglePass, plain: _BudgetRun
 ) -> dict[str, Array]:
     """Parts (1 + p,) of the variances of theta, its mean, and of the coefficients, of sources that are priors of
-    constants alone, by name; none where constants wander or fade, or where the filter started anew. ``trace`` is that
-    of the filter, with its heads."""
+    constants alone, by name; none where constants wander."""
     constants, at = problem.constants, list(problem.nuisances.values())
-    if constants.accelerometer_walk or constants.gyro_walk or len(trace.starts) != 1:
+    if constants.accelerometer_walk or constants.gyro_walk or passed.faded or problem.spatial:
         return {}
-    if any(head.F is not None for head in trace.heads) or problem.spatial:
-        return {}
-    known = [k for k in at if problem.covariance[k, k] > 0.0]
-    inverse = np.linalg.pinv(problem.covariance[np.ix_(known, known)], hermitian=True, rcond=1e-12)
-    roots = {}
+    known = [k for k, place in enumerate(at) if problem.covariance[place, place] > 0.0]
+    places = [at[k] for k in known]
+    inverse = np.linalg.pinv(problem.covariance[np.ix_(places, places)], hermitian=True, rcond=1e-12)
+    found = {}
     for source in of:
         own = [problem.names.index(name) for name in source.states]
-        if own and {*own} <= {*known} and not (source.constants or source.levels or source.zero):
-            there = [known.index(k) for k in own]
-            values, axes = np.linalg.eigh(problem.covariance[np.ix_(own, own)])
-            roots[source.name] = inverse[:, there] @ (axes * np.sqrt(np.maximum(values, 0.0)))
-    total, count = dict.fromkeys(roots, 0.0), 0
-    memory = loop.memory(BLOCK, problem.size, len(problem.places.moving), problem.count)
-    out, dt = np.empty((BLOCK, loop.OUTPUTS + problem.count + 1)), np.diff(t, prepend=t[:1])
-    dt[trace.starts[0].row] = 0.0
-    for block, before, _ in trace.heads:
-        belief = loop.Belief(*(part.copy() for part in before))
-        done = loop.advance(belief, loop.FusedRows(dt[block], rows[block]), problem.model, out, memory=memory)
-        seen = judged[block][:done] & np.isfinite(out[:done, 1])
-        theta = memory.after[:done, 1, known] + constants.common_delay * memory.after[:done, 2, known]
-        for name, by in roots.items():
-            total[name] += float(np.sum(np.square(theta[seen] @ by)))
-        count += int(seen.sum())
-    return {
-        name: np.append(
-            total[name] / max(count, 1), np.sum(np.square(belief.P[np.ix_(at, known)] @ by), axis=1)
-        )
-        for name, by in roots.items()
-    }
+        if own and {*own} <= {*places} and not (source.constants or source.levels or source.zero):
+            there = [places.index(k) for k in own]
+            prior = problem.covariance[np.ix_(own, own)]
+            by = inverse[:, there] @ prior @ inverse[there]
+            angle = float(np.sum(passed.by_constants[np.ix_(known, known)] * by))
+            across = plain.P[np.ix_(at, places)]
+            found[source.name] = np.append(angle, np.einsum("pi,ij,pj->p", across, by, across))
+    return found
 
 
 def sources(problem: FusionProblem, settings: AoaSettings) -> tuple[BudgetSource, ...]:
@@ -247,25 +255,22 @@ def _known_before(problem: FusionProblem, settings: AoaSettings) -> tuple[str, .
 
 
 class _BudgetRun(NamedTuple):
-    """One run: mean variance of theta ``angle`` [rad^2], covariance ``P`` and state ``x`` at the end, ``theta`` (k,) at
-    the rows that are judged, and the ``trace`` of the filter."""
+    """One run: mean variance of theta ``angle`` [rad^2], covariance ``P`` and state ``x`` at the end, and ``theta``
+    (k,) at the rows that are judged."""
 
     angle: float
     P: Array
     x: Array
     theta: Array
-    trace: FusionTrace
 
 
-def _run(
-    problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask, heads: bool = False
-) -> _BudgetRun:
-    """Run the fusion, with heads of blocks in its trace where they are asked for."""
-    block = BLOCK if smoothed or heads else 0
+def _run(problem: FusionProblem, t: Array, rows: Array, smoothed: bool, judged: Mask) -> _BudgetRun:
+    """Run the fusion."""
+    block = BLOCK if smoothed else 0
     state, trace = advance(initial(problem), problem, t, rows, last=True, block=block)
     out = smooth(problem, t, rows, trace) if smoothed else trace.out
     u = out[judged & np.isfinite(out[:, 1]), 1]
-    return _BudgetRun(float(np.mean(np.square(u))), state.P, state.x, out[judged, 0], trace)
+    return _BudgetRun(float(np.mean(np.square(u))), state.P, state.x, out[judged, 0])
 
 
 def _enlarged(problem: FusionProblem, rows: Array, source: BudgetSource) -> tuple[FusionProblem, Array]:

@@ -29,6 +29,7 @@ from inercal.systems.aoa.result.systematic import by_fusion, gravity_u
 from inercal.systems.aoa.settings import GYROS, AoaSettings
 
 if TYPE_CHECKING:
+    from inercal.systems.aoa.diagnosis.passed import AnglePass
     from inercal.systems.aoa.paper.delay import Delay
     from inercal.systems.aoa.reference.sensor_fit import Verified
     from inercal.systems.aoa.result.points import Point
@@ -82,12 +83,14 @@ def assemble(
     compared: Mapping[str, Angles] | None = None,
     verified: Verified | None = None,
     angles: Angles | None = None,
+    passed: AnglePass | None = None,
 ) -> Estimate:
     """The estimate by the fusion: the coefficients of the sensors at the end of a recording, as it was filtered.
 
     ``findings`` are those of the diagnosis, beside those of the recording; ``delay`` that of the gyro by the spectra;
     ``errors`` against the reference angle, by method; ``compared`` the angles of other methods, by name; ``verified``
-    the sensors as fitted to the reference angle; ``angles`` those of the fusion, where they are there already.
+    the sensors as fitted to the reference angle; ``angles`` those of the fusion, and ``passed`` the pass of the judge,
+    where they are there already.
     """
     angles = by_fusion(recording, settings, problem, filtered) if angles is None else angles
     names, at = tuple(problem.nuisances), list(problem.nuisances.values())
@@ -120,7 +123,8 @@ def assemble(
             result=result,
             beside=(ANGLE,),
         )
-    split = parts(recording, problem, settings, filtered.smoothed, np.isfinite(filtered.theta))
+    answered = np.isfinite(filtered.theta)
+    split = parts(recording, problem, settings, filtered.smoothed, answered, filtered, passed)
     covariance = P + split.common
     u = np.sqrt(np.diag(covariance))
     rows = zip(names, values.tolist(), u.tolist(), before.tolist(), strict=True)

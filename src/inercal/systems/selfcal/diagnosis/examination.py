@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from inercal.foundation.findings import EVERYTHING, Finding
+from inercal.foundation.inference.asked_pass import answers
 from inercal.foundation.inference.hypotheses import Hypothesis, likeliest, sigmas
 from inercal.foundation.inference.identifiability import UNSEEN
 from inercal.foundation.instruments.terms import shown_unit
@@ -29,7 +30,7 @@ from inercal.systems.selfcal.diagnosis.fit_quality import (
     white,
 )
 from inercal.systems.selfcal.diagnosis.gross import reordered_accelerometers
-from inercal.systems.selfcal.diagnosis.judged import answers, explaining, speaking
+from inercal.systems.selfcal.diagnosis.judged import explaining, speaking
 from inercal.systems.selfcal.diagnosis.noise_check import misstated, unsteady
 from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of, periodic
 from inercal.systems.selfcal.diagnosis.rig_errors import WANDERING

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.foundation.inference.asked_pass import PassQuestion
 from inercal.foundation.inference.scores import ErrorColumns, PassSums, joined
-from inercal.systems.selfcal.diagnosis.questions import PlatformQuestion, asked
+from inercal.systems.selfcal.diagnosis.questions import asked
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
@@ -32,7 +33,7 @@ class PlatformPass:
     problem: FilterProblem
     result: FilterResult
     errors: tuple[str, ...]
-    questions: tuple[PlatformQuestion, ...]
+    questions: tuple[PassQuestion, ...]
     sums: PassSums
     z: Array
     covariance: Array

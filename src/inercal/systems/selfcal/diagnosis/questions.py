@@ -16,6 +16,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import conjugate, rotate
+from inercal.foundation.inference.asked_pass import PassQuestion
 from inercal.foundation.inference.scores import ErrorColumns
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
@@ -72,23 +73,12 @@ class RowSignals(NamedTuple):
         return RowSignals(load, change, lagging, warm, self.th[rows], self.sense[rows])
 
 
-class PlatformQuestion(NamedTuple):
-    """A question: the ``cell`` order, place, reading or history, or ``rig``; its ``sentence`` without a full stop;
-    and the ``columns`` of the pass. ``named``: a hypothesis (`inercal.systems.selfcal.diagnosis.rig_errors`,
-    `inercal.systems.selfcal.diagnosis.small`) says the same with its value and its remedy."""
-
-    cell: str
-    sentence: str
-    columns: ErrorColumns
-    named: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class PassQuestions:
     """PassErrors of a pass, and the questions about their columns."""
 
     errors: PassErrors
-    questions: tuple[PlatformQuestion, ...]
+    questions: tuple[PassQuestion, ...]
 
 
 def _signals(recording: Recording, problem: FilterProblem) -> RowSignals:
@@ -188,7 +178,7 @@ def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
 
     errors = PassErrors(rig, True, tuple(counts.tolist()), courses)
     questions = [
-        PlatformQuestion(cell, sentence, ErrorColumns(np.array(at)), sentence.startswith(_NAMED))
+        PassQuestion(cell, sentence, ErrorColumns(np.array(at)), sentence.startswith(_NAMED))
         for (cell, sentence), at in places.items()
     ]
     kinds = np.array([KIND_OF[name] for name in rig])
@@ -198,11 +188,11 @@ def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
         sentence = f"The rig has {STATES[kind].words} that are no states".replace(
             ", in the extended model", ""
         )
-        questions.append(PlatformQuestion("rig", sentence, ErrorColumns(np.flatnonzero(kinds == kind)), True))
+        questions.append(PassQuestion("rig", sentence, ErrorColumns(np.flatnonzero(kinds == kind)), True))
     return PassQuestions(errors, (*questions, *_by_order(problem)))
 
 
-def _by_order(problem: FilterProblem) -> Iterator[PlatformQuestion]:
+def _by_order(problem: FilterProblem) -> Iterator[PassQuestion]:
     """Drift, bend, sway, settling and steps of the fitted values, by their kind."""
     tau = (np.arange(BLOCKS) + 0.5) / BLOCKS
     x = 2.0 * tau - 1.0
@@ -217,7 +207,7 @@ def _by_order(problem: FilterProblem) -> Iterator[PlatformQuestion]:
     )
     for kind in dict.fromkeys(kinds.tolist()):
         for words, course in shapes.items():
-            yield PlatformQuestion(
+            yield PassQuestion(
                 "order",
                 f"The values {kind} {words}",
                 ErrorColumns(np.flatnonzero(kinds == kind), course),
