@@ -6,6 +6,7 @@ Columns of what is asked are those of coefficients in each interval between node
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -114,20 +115,26 @@ def drifting(
 def evidence_of_unit(
     fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Array, code: str = ""
 ) -> tuple[FitEvidence, list[Question]]:
-    """The evidence of a fit and all that is asked of it, or what has a ``code``; noise is known but for a factor.
+    """The evidence of a fit and all that is asked of it, or what has a ``code``; noise is known but for a factor above 1.
 
     Raises LinAlgError where rounding leaves nothing of the information.
     """
     table = [question for question in _questions(fit, samples, settings) if not code or question.code == code]
     columns = np.concatenate([question.columns for question in table], axis=2)
     H, g = eliminated(fit, columns, np.zeros(columns.shape[2]))
-    of_fit, made = of_normal_equations(H, g, slope, fit.chi2, fit.dof, 0.0)
+    of_fit, made = of_normal_equations(H, g, slope, fit.chi2, fit.dof, _noise_dof(fit))
     ends = np.cumsum([question.columns.shape[2] for question in table])
     parts = np.split(made, ends[:-1], axis=1)
     return of_fit, [
         Question(q.cell, q.what, q.plural, q.verb, q.rest, part, q.code, q.action)
         for q, part in zip(table, parts, strict=True)
     ]
+
+
+def _noise_dof(fit: Fit) -> float:
+    """0 where residuals tell the size of the noise; inf where they are below what is stated: one noise of several is
+    stated too large then, and the others are what they are."""
+    return math.inf if fit.chi2 < fit.dof else 0.0
 
 
 def _questions(fit: Fit, samples: Samples, settings: StrapdownSettings) -> Iterator[Question]:
