@@ -10,7 +10,7 @@ from inercal.examples import FOLDER
 from inercal.faces.python.study import foresight, read_study, verticals
 from inercal.foundation.errors import InercalError
 from inercal.foundation.geometry.rotations import to_matrix
-from inercal.foundation.rigs.plans import named
+from inercal.foundation.rigs.plans import Plan, named
 from inercal.systems.selfcal.before.bounds import bounds
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.platform.kinematics import attitude
@@ -19,6 +19,7 @@ from inercal.systems.strapdown.before.bounds import Pieces
 from inercal.systems.strapdown.before.bounds import bounds as turn_bounds
 from inercal.systems.turntable.model import channels_of
 from inercal.systems.turntable.positions.fit import choose_terms
+from inercal.systems.turntable.positions.foresight import foresight as system_foresight
 from inercal.systems.turntable.positions.planning import design
 from inercal.systems.turntable.positions.tolerance_design import trial
 
@@ -50,6 +51,20 @@ def test_a_lever_does_what_its_key_in_the_study_does(studies, kind):
         factors = one.copy()
         factors[k] = 0.5
         np.testing.assert_allclose(whole.u(factors), halved.u(one), rtol=1e-3)  # four digits are written
+
+
+def test_a_plan_there_and_back_hides_fewer_faults_by_order_and_history(studies):
+    """Each position twice, the second time in the reverse order: a drift is no longer like a term. Readings of the same
+    size tell no more about curves."""
+    settings = studies("turntable").settings
+    angles = np.asarray(named("24-position").angles)
+    once, twice = (
+        system_foresight(replace(settings, plan=Plan("own", some))).blind
+        for some in (angles, np.concatenate([angles, angles[::-1]]))
+    )
+    assert twice["order"] < once["order"]
+    assert twice["history"] <= once["history"]
+    assert all(0.0 <= share <= 1.0 for share in (*once.values(), *twice.values()))
 
 
 def test_uncertainties_of_positions_are_those_of_their_design(studies):

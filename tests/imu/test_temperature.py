@@ -258,6 +258,20 @@ def test_the_covariance_is_that_of_weighted_least_squares_and_gravity_stays_comm
     np.testing.assert_allclose(found.covariance, own, rtol=1e-6)
 
 
+@pytest.mark.parametrize("jump", [0.0, 0.3])
+def test_a_jump_between_calibrations_is_named_by_what_it_shifts(jump):
+    """Twelve calibrations up to 60 degC, u 0.01, an output that jumps by 30 u at 30 degC: a cubic goes through it as
+    far as it can, and is off. Of calibrations that do not jump nothing is said."""
+    rng, T = np.random.default_rng(20261127), np.linspace(0.0, 60.0, 12)
+    y = 1.0 + 0.01 * T + jump * (T > 30.0) + 0.01 * rng.standard_normal(12)
+    found = fit_calibrations(
+        [calibration(x, [value]) for x, value in zip(T, y, strict=True)], files(12)
+    ).estimate
+    said = [finding for finding in found.findings if finding.code.startswith("by_")]
+    assert (found.status is Status.SUSPECT) == bool(said) == bool(jump)
+    assert all(finding.harm and "step" in finding.headline for finding in said)
+
+
 def test_a_coefficient_that_stays_is_explained_as_a_whole():
     found = fit_calibrations([calibration(x, [1.0]) for x in (0.0, 20.0, 40.0, 60.0)], files(4)).estimate
     assert found.result["curves"][0]["r2"] == 1.0

@@ -166,6 +166,34 @@ def test_sizes_and_shifts_of_errors_are_those_of_a_refit(kind, name, size):
     assert_allclose(score.shift / u[:18], shift / u[:18], atol=0.05)
 
 
+def test_nothing_of_an_error_is_left_beside_itself():
+    """Columns of any scale: the turn of the base about the vertical shows 1e-4 as well as those about level axes."""
+    settings = study(states="paper")
+    made, _ = drawn(settings, 4, beta_y=1e-3)
+    passed = pass_of(made, problem(settings), estimate(made, problem(settings)))
+    turned = passed.of_names(("beta_x", "beta_y", "beta_z"))
+    alone, again = passed.sums.ask(turned), passed.sums.ask(turned, turned)
+    assert alone.explained > 50.0
+    assert again is None or again.explained < 1e-3 * alone.explained
+
+
+def test_an_error_that_is_fitted_takes_what_it_explains():
+    """As further constants, by columns and by courses of time, it leaves what its score says, and nothing of itself."""
+    settings = study(states="paper")
+    made, _ = drawn(settings, 5, kg1_z=3e-5)
+    sums, of = (
+        (passed := pass_of(made, problem(settings), estimate(made, problem(settings)))).sums,
+        passed.problem,
+    )
+    course = np.cos(np.pi * (np.arange(whitened.BLOCKS) + 0.5) / whitened.BLOCKS)[:, None]
+    biases = ErrorColumns(np.array([of.names.index(f"kg0_{axis}") for axis in "xyz"]), course)
+    for columns in (passed.of_names(("kg1_x", "kg1_y", "kg1_z")), biases):
+        score = sums.ask(columns)
+        beside = sums.with_stated(columns, 1e4 * (np.abs(score.b) + score.u))
+        assert_allclose(sums.chi2 - beside.chi2, score.explained, rtol=1e-3)
+        assert_allclose(beside.change[-3:] / score.u, score.b / score.u, atol=1e-3)
+
+
 def test_a_course_of_time_is_that_of_readings_with_it():
     """An accelerometer whose bias drifts: the size asked for by blocks of time is the one put in, within its u."""
     settings = study(states="paper")

@@ -10,8 +10,6 @@ from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE, GravityInput
 from inercal.systems.selfcal.before.bounds import recorded_bounds
 from inercal.systems.selfcal.diagnosis.examination import diagnose
-from inercal.systems.selfcal.diagnosis.fit_quality import filtered
-from inercal.systems.selfcal.diagnosis.small import likely, small_errors
 from inercal.systems.selfcal.filters.problem import problem
 from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.rig import Base
@@ -90,7 +88,7 @@ def test_the_limit_of_the_verdict_is_raised_by_what_a_stated_tilt_explains():
     made = recorded(with_tilt(PLAIN, 10.0, -8.0))
     sure, doubted = with_tilt(PLAIN, 0.0, 0.0, 1.0), with_tilt(PLAIN, 0.0, 0.0, 5.0)
     contradicted, codes = calibrated(sure, made)
-    assert contradicted.status is Status.INCONSISTENT  # ten u off
+    assert contradicted.status is Status.SUSPECT  # ten u off
     assert codes == ["unmodelled"]
     assert contradicted.statistics["nis_limit"] == pytest.approx(PLAIN_LIMIT)
     agreeing, codes = calibrated(doubted, made)
@@ -105,7 +103,7 @@ def test_the_limit_of_the_verdict_is_raised_by_what_a_stated_tilt_explains():
 
 
 def test_without_anything_uncertain_the_limit_is_that_of_the_contract():
-    assert stated_errors(PLAIN) is None
+    assert stated_errors(PLAIN) == []
     result, _ = calibrated(PLAIN, recorded(PLAIN))
     assert result.statistics["nis_limit"] == pytest.approx(PLAIN_LIMIT)
 
@@ -118,32 +116,7 @@ def test_other_faults_stay_contradictions_beside_what_is_uncertain():
     assert (result.status, codes) == (Status.INCONSISTENT, ["command_shift"])
     # an uncertain latitude is no excuse for a tilt
     result, codes = calibrated(with_latitude(PLAIN, 40.0, 0.2), made)
-    assert (result.status, codes) == (Status.INCONSISTENT, ["unmodelled"])
-
-
-def test_a_world_is_moved_to_where_it_is():
-    """Least squares with a prior: tilt, which the recording tells, is found; an uncertainty too small leaves it."""
-    made = recorded(with_tilt(PLAIN, 10.0, -8.0))
-    stated = with_tilt(PLAIN, 0.0, 0.0, 5.0)
-    moved = likely(made, problem(stated), stated_errors(stated)).world
-    true = with_tilt(PLAIN, 10.0, -8.0).world
-    g = np.linalg.norm(true.up)
-    np.testing.assert_allclose(moved.up / g, true.up / g, atol=1.0 * ARCSEC)
-    assert np.linalg.norm(stated.world.up / g - true.up / g) > 12.0 * ARCSEC
-    sure = with_tilt(PLAIN, 0.0, 0.0, 1.0)
-    np.testing.assert_array_equal(likely(made, problem(sure), stated_errors(sure)).world.up, sure.world.up)
-
-
-def test_what_is_stated_is_fitted_with_its_uncertainty_for_a_prior():
-    """The search for errors has the stated latitude as a parameter: what it corrects agrees with the recording."""
-    made = recorded(with_latitude(PLAIN, 40.3))
-    stated = with_latitude(PLAIN, 40.0, 0.2)
-    errors, corrected = small_errors((made, problem(stated)), stated_errors(stated))
-    assert errors == []
-    assert np.degrees(np.arctan2(corrected[1].world.earth[1], corrected[1].world.earth[0])) == pytest.approx(
-        40.3, abs=0.05
-    )
-    assert filtered(corrected).nis.sum() < filtered((made, problem(stated))).nis.sum() - 9.0
+    assert (result.status, codes) == (Status.SUSPECT, ["unmodelled"])
 
 
 @pytest.mark.parametrize(("u", "named"), [(0.0, True), (0.01, True), (0.1, False)])
@@ -153,5 +126,5 @@ def test_a_verdict_that_values_can_be_used_names_what_speaks_against_it(u, named
     off = np.abs((result.values - TRUTH[:18]) / result.u).max()
     assert result.status is (Status.SUSPECT if named else Status.OK)
     assert codes == ["site_suspect"] * named
-    assert result.message.endswith("but see site_suspect: values may be off by more than their u") == named
+    assert ("but see site_suspect" in result.message) == named
     assert (off > 5.0) == named

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from paper_study import ARCSEC, DEG, study
+from paper_study import DEG, study
 
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import GravityInput
@@ -19,7 +19,6 @@ from inercal.systems.selfcal.filters.run import estimate
 from inercal.systems.selfcal.platform.coefficients import ETA, KA1, divisor, names, product_slope, to_product
 from inercal.systems.selfcal.platform.plan import PlatformPlan, Turn
 from inercal.systems.selfcal.result import budget as sources
-from inercal.systems.selfcal.result.budget import stated_errors
 from inercal.systems.selfcal.result.columns import history_record
 from inercal.systems.selfcal.result.outcome import assemble
 from inercal.systems.selfcal.settings import Filter, Noise
@@ -99,26 +98,6 @@ def test_the_parts_of_a_covariance_are_symmetric_and_add_up_to_it():
         )
     u = np.sqrt(np.diag(P))
     np.testing.assert_allclose(total / np.outer(u, u), P / np.outer(u, u), atol=1e-6)
-
-
-def test_a_statement_that_is_not_changed_changes_nothing():
-    """The world at zero of what is stated is the world itself, and each part acts by itself to first order."""
-    site = replace(SHORT.site, inputs=(GravityInput("gravity", 1e-4, "m/s^2", 1.0),), latitude_u=0.1 * DEG)
-    settings = replace(SHORT, site=site, base=replace(SHORT.base, heading_u=10.0 * ARCSEC))
-    cause, of = stated_errors(settings), calibrate(to_record(recorded(settings)), settings).problem
-    n = len(cause.parameters)
-    made = recorded(settings)
-    at_zero = cause.without((made, of), np.zeros(n))[1].world
-    np.testing.assert_array_equal(at_zero.earth, of.world.earth)
-    np.testing.assert_array_equal(at_zero.up, of.world.up)
-    together = cause.without((made, of), np.full(n, 0.1))[1].world
-    alone = [cause.without((made, of), 0.1 * row)[1].world for row in np.eye(n)]
-    for name in ("earth", "up"):
-        here = getattr(of.world, name)
-        added = here + sum(getattr(each, name) - here for each in alone)
-        np.testing.assert_allclose(
-            getattr(together, name), added, rtol=0.0, atol=1e-14 * np.linalg.norm(here)
-        )
 
 
 @pytest.mark.parametrize("converged", [True, False])

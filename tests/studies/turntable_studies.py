@@ -116,7 +116,7 @@ def wheel_output(axis, c, a, w):
 
 def codes_of(estimate):
     """Codes of the findings but those of what no test would show, which most plans have."""
-    usual = ("weak_test", "stated_exact")
+    usual = ("blind", "stated_exact")
     return [finding.code for finding in estimate.findings if finding.code not in usual]
 
 

@@ -102,7 +102,7 @@ DX_F = "10 deg/h"
     drift = next(each for each in said["parameters"] if each["name"] == "DX_F")
     assert drift["value"] / DEG_H == pytest.approx(10.5, abs=0.05)
     assert drift["u"] / DEG_H == pytest.approx(np.std([10, 12, 9.5], ddof=1) / np.sqrt(3.0), rel=0.05)
-    assert {each["code"] for each in said["findings"]} == {"stated_exact", "weak_test", "between_runs"}
+    assert {each["code"] for each in said["findings"]} == {"stated_exact", "blind", "between_runs"}
     assert "The runs about their combined value" in page.read_text("utf-8")
     assert run(["calibrate", "turntable", *files, "--study", where]) == 0
     shown = capsys.readouterr().out

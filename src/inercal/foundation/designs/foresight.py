@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -41,7 +41,8 @@ class Foresight:
 
     ``names`` (p,) of the coefficients with their ``units`` for people, ``sizes`` (p,) of these in SI; ``levers`` (k,)
     are noise and errors that the study states; ``u`` gives uncertainties (p,) [SI] where each is so many times (k,) as
-    large.
+    large. ``blind``: the share of the faults by order, place, reading and history that would shift a value by 2 u
+    unseen, where that is told.
     """
 
     names: tuple[str, ...]
@@ -49,6 +50,13 @@ class Foresight:
     sizes: Array
     levers: tuple[Lever, ...]
     u: Callable[[Array], Array]
+    blind: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def hides(self) -> str:
+        """Faults that the plan hides, in words; empty where that is not told."""
+        parts = ", ".join(f"{100.0 * share:.0f} % by {cell}" for cell, share in self.blind.items())
+        return f"Faults that would shift a value by 2 u unseen: {parts}." if parts else ""
 
     def shares(self, factors: Array) -> Array:
         """Share (k, p) of each lever in the variance of each coefficient; what is left is of the prior and the site.

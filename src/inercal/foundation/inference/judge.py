@@ -148,40 +148,59 @@ def _finding(
     return Finding(code, headline, "", harm, action=action, items=tuple(items))
 
 
-def blind(names: Sequence[str], u: Array, of_fit: FitEvidence, pairs: Asked) -> Iterator[Finding]:
-    """The finding about questions that would shift a value by more than 2 u before they are answered.
-
-    Their size is that at which they are significant; parameters as in `answers`.
-    """
+def unseen(u: Array, of_fit: FitEvidence, pairs: Asked) -> Array:
+    """Shifts (q, p) of the values, over u, by each question at the size at which it is significant: what a test cannot
+    exclude. Parameters as in `answers`."""
     from scipy.special import chdtri, fdtri
 
-    worst: list[tuple[float, str, Question]] = []
+    made = np.zeros((len(pairs), len(u)))
+    stated = math.isinf(of_fit.noise_dof)
     with np.errstate(divide="ignore", invalid="ignore"):
-        for question, asked in pairs:
+        for row, (_, asked) in zip(made, pairs, strict=True):
             m, risk = asked.count, LIMITS.question_risk / len(pairs)
-            stated = math.isinf(of_fit.noise_dof)
             free = max(of_fit.dof - m, 1.0) + (0.0 if stated else of_fit.noise_dof)
             size = chdtri(m, risk) if stated else m * fdtri(m, free, 1.0 - risk)
-            shifts = np.nan_to_num(np.linalg.norm(asked.reach, axis=1) / u) * math.sqrt(float(size))
-            k = int(np.argmax(shifts))
-            if shifts[k] > LIMITS.harm:
-                worst.append((float(shifts[k]), names[k], question))
-    if worst:
-        worst.sort(key=lambda one: -one[0])
-        by_cell = {cell: sum(one[2].cell == cell for one in worst) for cell in _CODES}
-        items: list[dict[str, str | float]] = [
-            {"unseen": one.sentence, "shifts": name, "by up to, in u": shift}
-            for shift, name, one in worst[:5]
-        ]
-        items += [
-            {"unseen": f"by {cell}", "faults": float(count)} for cell, count in by_cell.items() if count
-        ]
-        yield Finding(
-            "blind",
-            f"This plan cannot exclude {len(worst)} of {len(pairs)} faults that would shift a value by 2 u.",
-            action="Repeat sections at the end, in another order, and at other rates and angles.",
-            items=tuple(items),
-        )
+            row[:] = np.nan_to_num(np.linalg.norm(asked.reach, axis=1) / u) * math.sqrt(float(size))
+    return made
+
+
+def blind_shares(fit: JudgedFit) -> dict[str, float]:
+    """Share of the questions by order, place, reading and history that would shift a value by more than 2 u before they
+    are answered; empty where none can be asked."""
+    try:
+        of_fit = evidence_of(fit)
+    except np.linalg.LinAlgError:
+        return {}
+    pairs = asked_of(of_fit, questions(fit)) if of_fit.dof > 0 else []
+    hides = unseen(fit.u, of_fit, pairs).max(axis=1, initial=0.0) > LIMITS.harm
+    cells = np.array([question.cell for question, _ in pairs])
+    return {cell: float(hides[cells == cell].mean()) for cell in _CODES if (cells == cell).any()}
+
+
+def blind(names: Sequence[str], u: Array, of_fit: FitEvidence, pairs: Asked) -> Iterator[Finding]:
+    """The finding about questions that would shift a value by more than 2 u before they are answered; parameters as in
+    `answers`."""
+    shifts = unseen(u, of_fit, pairs)
+    most = shifts.max(axis=1, initial=0.0)
+    worst = [int(k) for k in np.argsort(-most) if most[k] > LIMITS.harm]
+    if not worst:
+        return
+    items: list[dict[str, str | float]] = [
+        {
+            "unseen": pairs[k][0].sentence,
+            "shifts": names[int(np.argmax(shifts[k]))],
+            "by up to, in u": float(most[k]),
+        }
+        for k in worst[:5]
+    ]
+    counts = {cell: sum(pairs[k][0].cell == cell for k in worst) for cell in _CODES}
+    items += [{"unseen": f"by {cell}", "faults": float(count)} for cell, count in counts.items() if count]
+    yield Finding(
+        "blind",
+        f"This plan cannot exclude {len(worst)} of {len(pairs)} faults that would shift a value by 2 u.",
+        action="Repeat a part at the end, in another order, and at other rates and angles.",
+        items=tuple(items),
+    )
 
 
 def _item(kind: str, question: Question, chance: float) -> dict[str, str | float]:

@@ -132,6 +132,9 @@ class _Subject:
     columns: Array
 
 
+CELLS = ("order", "place", "reading", "history")
+"""Things that errors go by."""
+
 _TRIADS = {"acc": "the accelerometers", "gyro": "the gyro"}
 """Channels in words by the head of their names."""
 

@@ -118,6 +118,8 @@ class PassSums:
     def with_stated(self, a: ErrorColumns, u: Array) -> PassSums:
         """The sums of a pass that has the columns of an error as constants too, 0 with standard uncertainties ``u``
         (k,); they come behind the others, and no course of time is asked of them."""
+        if a.course is not None:
+            return self._with_course(a.at, a.course, u)
         across, p = self.across[:, :, a.at], len(self.prior)
         across = across if a.by is None else across @ a.by
         k = across.shape[2]
@@ -130,6 +132,20 @@ class PassSums:
         more[0, 1 + p :] = self.errors[a.at] if a.by is None else a.by.T @ self.errors[a.at]
         prior, off = np.append(self.prior, u), np.append(self.off, np.zeros(k))
         return PassSums(prior, off, fitted, more, self.errors, self.squares, self.dof)
+
+    def _with_course(self, at: NDArray[np.int64], course: Array, u: Array) -> PassSums:
+        """`with_stated` of constants ``at`` (q,), each times each column of a ``course`` (blocks, k)."""
+        blocks, p, k = len(course), len(self.prior), course.shape[1] * len(at)
+        fitted, own = np.zeros((blocks, 1 + p + k, 1 + p + k)), self.fitted[:, 1 + at]
+        fitted[:, : 1 + p, : 1 + p] = self.fitted
+        fitted[:, 1 + p :, : 1 + p] = np.einsum("bk,bij->bkij", course, own).reshape(blocks, k, -1)
+        fitted[:, : 1 + p, 1 + p :] = np.swapaxes(fitted[:, 1 + p :, : 1 + p], 1, 2)
+        both = np.einsum("bk,bl,bij->bkilj", course, course, own[:, :, 1 + at], optimize=True)
+        fitted[:, 1 + p :, 1 + p :] = both.reshape(blocks, k, k)
+        more = np.einsum("bk,bim->bkim", course, self.across[:, 1 + at]).reshape(blocks, k, -1)
+        prior, off = np.append(self.prior, u), np.append(self.off, np.zeros(k))
+        across = np.concatenate([self.across, more], axis=1)
+        return PassSums(prior, off, fitted, across, self.errors, self.squares, self.dof)
 
     def _across(self, a: ErrorColumns) -> Array:
         """(1 + p, k) products of z and A with columns."""
@@ -171,16 +187,24 @@ class PassSums:
         return np.asarray(self._products(a, b) - self._across(a)[1:].T @ (self.covariance @ by))
 
     def ask(self, a: ErrorColumns, beside: ErrorColumns | None = None) -> ErrorScore | None:
-        """The score test of an error, fitted together with the one ``beside`` it; None where it does not show."""
+        """The score test of an error, fitted together with the one ``beside`` it; None where it does not show.
+
+        Where more is left than noise explains, the chance is that by what is left.
+        """
         from scipy.special import chdtrc
 
         size = np.sqrt(np.maximum(np.diag(self._products(a, a)), 1e-300))
         information, score, reach = self.information(a), self.score(a), self.reach(a)
+        left = self.chi2
         if beside is not None:
             between = self.information(beside, a)
-            inverse = np.linalg.pinv(self.information(beside), rcond=SEEN**2, hermitian=True)
+            units = np.sqrt(np.maximum(np.diag(self._products(beside, beside)), 1e-300))
+            scaled = self.information(beside) / units[:, None] / units
+            inverse = np.linalg.pinv(scaled, rcond=SEEN**2, hermitian=True) / units[:, None] / units
             information = information - between.T @ inverse @ between
-            score = score - between.T @ inverse @ self.score(beside)
+            of_beside = self.score(beside)
+            score = score - between.T @ inverse @ of_beside
+            left -= float(of_beside @ inverse @ of_beside)
             reach = reach - self.reach(beside) @ inverse @ between
         strength, ways = np.linalg.eigh(information / size[:, None] / size)
         shown = strength > SEEN**2
@@ -191,9 +215,9 @@ class PassSums:
         explained = float(along @ (along / strength))
         b, count = ways @ (along / strength), int(shown.sum())
         u = np.sqrt(np.square(ways) @ (1.0 / strength))
-        return ErrorScore(
-            count, float(chdtrc(count, explained)), explained, b, u, reach @ b, ways / np.sqrt(strength)
-        )
+        noise = max(1.0, (left - explained) / max(self.dof - count, 1))
+        chance = float(chdtrc(count, explained / noise))
+        return ErrorScore(count, chance, explained, b, u, reach @ b, ways / np.sqrt(strength))
 
 
 def joined(errors: Sequence[ErrorColumns]) -> ErrorColumns:

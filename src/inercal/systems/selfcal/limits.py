@@ -16,6 +16,12 @@ class Limits:
     place_turn: float = math.radians(10.0)
     """Turn [rad] of a joint from which readings are asked whether they depend on its angle."""
 
+    second_order: float = 0.05
+    """Part of the sum of squares that an error explains below which what is left beside it is of second order."""
+
+    free_prior: float = 1e4
+    """Sizes of an error, and of its u, that make the prior of one that is fitted freely."""
+
     gross_faults: int = 4
     """Gross faults that are looked for, one after the other."""
 
@@ -130,7 +136,13 @@ class Limits:
     """Steps by which a recording may be shorter than its path."""
 
     single_rows: int = 60
-    """Rows that are left out one after the other before they no longer count as single."""
+    """Rows that are left out before they no longer count as single."""
+
+    single_rounds: int = 5
+    """Rounds in which they are looked for."""
+
+    single_apart: int = 100
+    """Rows within which one reading that is far off spoils those after it."""
 
     single_sigmas: float = 4.0
     """Innovation over its standard deviation from which a reading of a surprising row is left out."""
@@ -169,7 +181,7 @@ class Limits:
     """Constant errors that are looked for, one after the other."""
 
     wandering: int = 5
-    """Cosines of time, from half a period of the recording on, of which a bias is sought that wanders."""
+    """Cosines of time, from half a period of the recording on, by which biases may wander that count in u."""
 
     small_delay: float = 0.1
     """Time [s] up to which encoders or accelerometers are believed to be late."""
@@ -179,18 +191,6 @@ class Limits:
 
     left_over: float = 0.25
     """Part of what innovations are off, in mean square or correlation, that a walk may leave of 1/f noise."""
-
-    alike_misfit: float = 6.0
-    """Sum of squares by which a constant error may explain less than the likeliest and still be called as possible."""
-
-    alike_fits: int = 3
-    """Constant errors that are fitted to see which are alike."""
-
-    judged_rows: int = 1 << 15
-    """Rows whose innovations small errors are sought in; a longer recording is averaged over blocks of rows before."""
-
-    block_turn: float = math.radians(20.0)
-    """Turn [rad] within a block of rows, at most."""
 
     summed_turn: float = math.radians(2.0)
     """Turn [rad] over which whitened innovations are summed for the judge: no course changes by more than 2 %."""

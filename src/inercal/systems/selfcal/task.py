@@ -19,8 +19,8 @@ from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.diagnosis.examination import diagnose
 from inercal.systems.selfcal.diagnosis.passed import pass_of
 from inercal.systems.selfcal.estimators import KINDS, FilterKind
-from inercal.systems.selfcal.filters import averaged, whitened
 from inercal.systems.selfcal.filters import run as filtering
+from inercal.systems.selfcal.filters import whitened
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.gaps import taken_anew
 from inercal.systems.selfcal.filters.problem import FilterProblem, problem
@@ -65,7 +65,6 @@ def load_kernels(settings: SelfcalSettings, compare: bool = False) -> None:
     empty = Recording(np.empty(0), none, none, none)
     recorded_bounds(empty, of, np.empty((0, 4)), np.zeros(len(of.prior)), contributions=True)
     whitened.load_kernels(of)
-    averaged.load_kernels(of)
     considered.load_kernels(of)
 
 

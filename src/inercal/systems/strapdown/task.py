@@ -77,7 +77,7 @@ def calibrate(
         estimate = useless(record, samples, rests, settings, force)
         return StrapdownCalibration(timed(estimate, clock), samples, rests, None)
     progress("estimating noise")
-    settings, fitted, ramps = with_noise_shown(samples, nodes, settings, fitted)
+    settings, fitted, still = with_noise_shown(samples, nodes, settings, fitted)
     by_filter = None
     if settings.filter == "error-state":
         progress("filtering")
@@ -86,5 +86,7 @@ def calibrate(
             estimate = failed(record, samples, rests, settings)
             return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)
     progress("assembling")
-    estimate = assemble(record, samples, rests, fitted, settings, ramps, by_filter)
+    estimate = assemble(
+        record, samples, rests, fitted, settings, None if still is fitted else still, by_filter
+    )
     return StrapdownCalibration(timed(estimate, clock), samples, rests, fitted)

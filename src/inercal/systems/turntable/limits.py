@@ -57,8 +57,7 @@ class Limits:
     """Shift of a value by a significant fault, over u, beyond which it does harm; a smaller one counts in u."""
 
     blind_shift: float = 4.0
-    """Shift of a value, over u, by a fault that is named in half of the tests, beyond which a finding says that the
-    residuals might not show it; of a larger one so much counts in u."""
+    """Shift of a value, over u, by a fault that is named in half of the tests: of a larger one so much counts in u."""
 
     drift_sigmas: float = 4.0
     """Standard uncertainties by which drift within the dwells may differ from that between them to be used with it."""

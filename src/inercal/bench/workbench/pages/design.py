@@ -147,7 +147,7 @@ class Desk:
         self.sliders(foresight)
         self.repeat()
         count = f"{len(up)} stops, " if len(up) else ""
-        self.say(f"{count}{len(foresight.names)} values are predicted.", True)
+        self.say(f"{count}{len(foresight.names)} values are predicted. {foresight.hides}".rstrip(), True)
 
     def say(self, words: str, good: bool) -> None:
         """The line above all."""

@@ -14,6 +14,7 @@ from inercal.foundation.findings import Finding, Status
 from inercal.foundation.inputs import Source
 from inercal.foundation.results.result import Estimate, coverage_factor
 from inercal.systems.imu.limits import LIMITS
+from inercal.systems.imu.temperature.judged import judged_points
 from inercal.systems.imu.temperature.model import REFERENCE, Curve, TemperatureModel, assemble, no_span
 from inercal.systems.imu.temperature.polynomial import (
     HIGHEST_ORDER,
@@ -89,7 +90,7 @@ def fit_calibrations(
     rising = 0.5 * np.sign(np.concatenate([step[:1], step]))
     both = bool(min(np.sum(rising > 0), np.sum(rising < 0)) >= 2 and len(T) > terms + 2)
     nothing = np.empty((len(T), 0))
-    curves = []
+    curves, judged = [], list[Finding]()
     for k, name in enumerate(first.names):
         y = np.array([estimate.values[k] for estimate in estimates])
         # what comes from elsewhere moves all alike: it belongs to the values, not to their change
@@ -115,6 +116,7 @@ def fit_calibrations(
                 np.sqrt(variances),
             )
         )
+        judged += judged_points(curves[-1], own, 1.0 / len(first.names))
     findings = [
         Finding(
             "bad_verdict",
@@ -125,6 +127,7 @@ def fit_calibrations(
         for estimate, file in zip(estimates, files, strict=True)
         if estimate.status is Status.SUSPECT
     ]
+    findings += judged
     if terms < 4 and order is None:
         text = (
             f"{distinct} temperatures carry a polynomial of degree {terms - 1} only, expected 5 for a cubic: what the "

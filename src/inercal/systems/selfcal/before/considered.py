@@ -80,19 +80,6 @@ def load_kernels(problem: FilterProblem) -> None:
     sensitivities(recording, problem, np.eye(4)[[0, 0]], np.zeros(len(problem.prior)), ())
 
 
-def innovation_slopes(
-    recording: Recording,
-    problem: FilterProblem,
-    attitudes: Array,
-    coefficients: Array,
-    names: Sequence[str],
-    restarts: Sequence[int],
-) -> Array:
-    """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, as `sensitivities`
-    has those of the estimates; 0 where nothing was measured."""
-    return both(recording, problem, attitudes, coefficients, names, restarts)[0]
-
-
 def both(
     recording: Recording,
     problem: FilterProblem,
@@ -101,7 +88,8 @@ def both(
     names: Sequence[str],
     restarts: Sequence[int],
 ) -> tuple[Array, Array]:
-    """`innovation_slopes` (n - 1, 6, m) and `sensitivities` (p, m), in one run."""
+    """Changes (n - 1, 6, m) of the normalised innovations per error of each of ``names`` (m,), SI, 0 where nothing was
+    measured, and `sensitivities` (p, m), in one run."""
     slopes = np.zeros((len(recording.t), 6, len(names)))
     S = _carried(recording, problem, attitudes, coefficients, names, restarts, slopes)
     return slopes[1:], -S[3:]

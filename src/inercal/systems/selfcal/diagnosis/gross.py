@@ -31,7 +31,8 @@ from inercal.foundation.geometry.rotations import (
 )
 from inercal.foundation.inference.hypotheses import Hypothesis, tried
 from inercal.foundation.records.checks.values import saturated
-from inercal.systems.selfcal.diagnosis.fit_quality import Case
+from inercal.systems.selfcal.diagnosis.rows import GrossFault
+from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.plan import PlatformPlan
@@ -309,9 +310,8 @@ def clipped(recording: Recording, settings: SelfcalSettings, channel: str) -> bo
     return False
 
 
-def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
+def reordered_accelerometers(recording: Recording, problem: FilterProblem) -> Iterator[GrossFault]:
     """Accelerometers exchanged or reversed: the signed permutation that agrees best with the encoders."""
-    recording, problem = case
     q, _ = gimbals(recording.th, problem.world)
     acc, up = recording.acc[1:], rotate(conjugate(q), problem.world.up)[1:]
     both = np.isfinite(acc).all(axis=1) & np.isfinite(up).all(axis=1)
@@ -332,16 +332,15 @@ def reordered_accelerometers(case: Case) -> Iterator[Hypothesis[Case]]:
     if not words:
         return
 
-    def without(case: Case, _: Array) -> Case:
-        recording, problem = case
-        right = np.empty_like(recording.acc)
-        for i in sensors:
-            right[:, order[i]] = signs[i] * recording.acc[:, i]
-        return replace(recording, acc=right), problem
-
+    right = np.empty_like(recording.acc)
+    for i in sensors:
+        right[:, order[i]] = signs[i] * recording.acc[:, i]
     code = "sign_suspect" if order == sensors else "channel_swap"
-    text = f"{', '.join(words)}: correct their columns or signs in the map"
-    yield Hypothesis(text, code, text, without, alternatives=len(ways) - 1, harm=EVERYTHING)
+    found = Finding(
+        code, ", ".join(words), harm=EVERYTHING, action="correct their columns or signs in the map"
+    )
+    chance = 2.0 * math.log((len(ways) - 1) / LIMITS.risk)
+    yield GrossFault(found, replace(recording, acc=right), chance)
 
 
 def off_the_path(

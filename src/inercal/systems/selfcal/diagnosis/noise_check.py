@@ -1,10 +1,7 @@
 """The noise that sensors show in the innovations of the error-state filter, beside the stated one.
 
-States without which a recording contradicts the model: what explains the innovations that no constant error does.
-
-With delays and levers among the states rows count less in which the rate changes; with biases that walk they follow the
-sensors. Each addition is tried by the error-state filter. The first that leaves innovations white is named, else that
-which leaves them whitest; 1/f noise, which is no walk to the letter, by the walk that takes most of them away.
+Walks of the gyros other than stated, and biases that walk, are tried by the error-state filter: that which leaves
+innovations white is named; 1/f noise, which is no walk to the letter, by the walk that takes most of them away.
 """
 
 from __future__ import annotations
@@ -21,25 +18,19 @@ from inercal.foundation.inference.consistency import slow_power, whiteness
 from inercal.foundation.inference.hypotheses import sigmas
 from inercal.foundation.records.places import places
 from inercal.foundation.units import parse_quantity
-from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered, once, regular, short, sound
+from inercal.systems.selfcal.diagnosis.fit_quality import filtered, regular, sound
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.recording import Recording
-from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, RIG, STATES
+from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, KIND_OF, STATES
 from inercal.systems.selfcal.settings import Noise
 
-_TOGETHER: Final = "several errors of the rig together"
-
 #: kinds of states that are tried, and how they are named
-_TRIED: Final[tuple[tuple[tuple[str, ...], str, str], ...]] = (
-    (("delay",), "sensors that are late", "delay"),
-    (("levers",), "accelerometers away from the centre of the gimbals", "levers"),
-    (("accelerometer_walk",), "accelerometer biases that wander", "bias_walk"),
-    (("gyro_walk",), "gyro biases that wander", "bias_walk"),
-    (BIAS_WALK, "biases that wander", "bias_walk"),
-    ((*RIG, "k2", "levers"), _TOGETHER, '"rig", "k2", "levers"'),
-    ((*RIG, "k2", "levers", *BIAS_WALK), _TOGETHER, '"rig", "k2", "levers", "bias_walk"'),
+_TRIED: Final[tuple[tuple[tuple[str, ...], str], ...]] = (
+    (("accelerometer_walk",), "accelerometer biases that wander"),
+    (("gyro_walk",), "gyro biases that wander"),
+    (BIAS_WALK, "biases that wander"),
 )
 
 _FACTORS: Final = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
@@ -54,23 +45,20 @@ class Explained(NamedTuple):
     white: float
 
 
-@once
-def unmodelled_states(case: Case) -> Explained | None:
-    """The addition to the states that leaves innovations white, or most nearly so, if any does."""
-    recording, problem = short(case)
-    first = filtered((recording, problem))
-    best, most, much = None, None, LIMITS.left_over * _off(recording, first) * _throughout(recording, first)
-    for kinds, words, named in _TRIED:
-        walks, before = {*kinds} <= {*BIAS_WALK}, math.inf
-        for factor in _FACTORS if {*BIAS_WALK} & {*kinds} else (1.0,):
+def _walking_biases(recording: Recording, problem: FilterProblem, now: FilterResult) -> Explained | None:
+    """Biases that walk, or walk more than stated, that leave innovations white, or most nearly so, if any do."""
+    best, most, much = None, None, LIMITS.left_over * _off(recording, now) * _throughout(recording, now)
+    for kinds, words in _TRIED:
+        before = math.inf
+        for factor in _FACTORS:
             wider = _with_states(problem, kinds, factor)
             known = len(wider.names) == len(problem.names)
             if known and (kinds != BIAS_WALK or factor == 1.0):
                 continue
-            now = filtered((recording, wider))
-            white = whiteness(regular(recording, now)) if sound(now) else 0.0
+            then = filtered(recording, wider)
+            white = whiteness(regular(recording, then.innovations)) if sound(then) else 0.0
             larger = f"{factor:g} times accelerometer_walk and gyro_walk under [noise]"
-            advice = f"state {larger}" if known else f"name {named} in states under [model]"
+            advice = f"state {larger}" if known else "name bias_walk in states under [model]"
             if factor > 1.0 and not known:
                 advice += f", with {larger}"
             if white > max(LIMITS.nearly_white, best.white if best else 0.0):
@@ -78,8 +66,8 @@ def unmodelled_states(case: Case) -> Explained | None:
                 best = Explained(Finding("unmodelled", text, harm=EVERYTHING, action=advice), white)
             if white > LIMITS.risk:
                 return best
-            left = _off(recording, now)
-            if walks and left < much:
+            left = _off(recording, then)
+            if left < much:
                 text = f"most of the innovations look like {words}, as with 1/f noise"
                 found = Finding("unmodelled", text, harm=EVERYTHING, action=advice)
                 most, much = Explained(found, white), 0.5 * left
@@ -92,7 +80,7 @@ def unmodelled_states(case: Case) -> Explained | None:
 def _off(recording: Recording, now: FilterResult) -> float:
     """Distance of innovations from white ones of the stated size: the largest, over both sensors, of what their mean
     square is off and of their correlation from row to row."""
-    z, off = regular(recording, now), 0.0
+    z, off = regular(recording, now.innovations), 0.0
     for columns in (z[:, :3], z[:, 3:]):
         products, squares = columns[1:] * columns[:-1], np.square(columns)
         if np.isfinite(products).any():
@@ -104,7 +92,7 @@ def _off(recording: Recording, now: FilterResult) -> float:
 
 def _throughout(recording: Recording, now: FilterResult) -> bool:
     """True where innovations are too large in most of the recording, as noise makes them, not in a part of it."""
-    squares = np.square(regular(recording, now))
+    squares = np.square(regular(recording, now.innovations))
     if not np.isfinite(squares).any():
         return False
     parts = [part[np.isfinite(part)] for part in np.array_split(squares, LIMITS.even_parts)]
@@ -134,12 +122,12 @@ _SENSORS = ("accelerometers", "encoders")
 _NOISE = "state the noise as it is under [noise]"
 
 
-def misstated(case: Case, now: FilterResult) -> list[Finding]:
+def misstated(recording: Recording, problem: FilterProblem, now: FilterResult) -> list[Finding]:
     """Innovations larger or smaller than the stated noise has them, or correlated in time."""
     if not now.converged:
         text = f"the error-state filter fails on this recording: {now.message}"
         return [Finding("contradiction", text, harm=EVERYTHING)]
-    z = regular(case[0], now)
+    z = regular(recording, now.innovations)
     findings, wide = [], False
     for sensor, columns in zip(_SENSORS, (z[:, :3], z[:, 3:]), strict=True):
         finite = columns[np.isfinite(columns)]
@@ -157,20 +145,20 @@ def misstated(case: Case, now: FilterResult) -> list[Finding]:
             findings.append(Finding("low_scatter", text, action=_NOISE))
     if findings:
         return findings
-    if not wide and case[1].noise.unsteady:
+    if not wide and problem.noise.unsteady:
         return []  # readings on a base that sways, or vibrates, are not independent
     if not wide and whiteness(z) > LIMITS.risk:
-        return _wandering(case, z)
-    if (swaying := _swaying(case, z)) is not None:
+        return _wandering(recording, problem, z)
+    if (swaying := _swaying(recording, problem, z)) is not None:
         return [swaying]
-    return [unsteady(case) or _unexplained(z)]
+    return [unsteady(recording, problem, now) or _unexplained(z)]
 
 
-def unsteady(case: Case, any_states: bool = True) -> Finding | None:
-    """A walk of the gyros other than stated, or further states: that which leaves innovations whiter, if any, and the
-    other as possible too. States alone count with ``any_states`` only."""
-    noise, states = _restless_gyros(case), unmodelled_states(case)
-    found = [each for each in (noise, states if noise or any_states else None) if each]
+def unsteady(recording: Recording, problem: FilterProblem, now: FilterResult) -> Finding | None:
+    """A walk of the gyros other than stated, or biases that walk: that which leaves innovations whiter, if any, and the
+    other as possible too. ``now`` is what the filter makes of the recording."""
+    noise = _restless_gyros(recording, problem, now)
+    found = [each for each in (noise, _walking_biases(recording, problem, now)) if each]
     if not found:
         return None
     best, *others = sorted(found, key=lambda each: -each.white)
@@ -179,9 +167,8 @@ def unsteady(case: Case, any_states: bool = True) -> Finding | None:
     )
 
 
-def _wandering(case: Case, z: Array) -> list[Finding]:
+def _wandering(recording: Recording, problem: FilterProblem, z: Array) -> list[Finding]:
     """Biases of accelerometers that wander and are no states, which slow power shows where nothing else does."""
-    recording, problem = case
     rows = LIMITS.slow_time / float(np.median(recording.dt))
     if problem.states.has("accelerometer_walk") or slow_power(z[:, :3], rows) > LIMITS.risk:
         return []
@@ -190,10 +177,9 @@ def _wandering(case: Case, z: Array) -> list[Finding]:
     return [Finding("unmodelled", text, harm=EVERYTHING, action=action)]
 
 
-def _swaying(case: Case, z: Array) -> Finding | None:
+def _swaying(recording: Recording, problem: FilterProblem, z: Array) -> Finding | None:
     """One frequency in the innovations of the encoders, if any: Fisher's test of the largest ordinate of a periodogram
     (R. A. Fisher, Tests of significance in harmonic analysis, Proceedings of the Royal Society A 125 (1929) 54)."""
-    recording, problem = case
     n, dt = len(z), float(np.median(recording.dt))
     power = np.square(np.abs(np.fft.rfft(np.nan_to_num(z[:, 3:]), axis=0))).sum(axis=1)[1 : (n + 1) // 2]
     if n < LIMITS.scatter_scalars or not power.any():
@@ -208,7 +194,7 @@ def _swaying(case: Case, z: Array) -> Finding | None:
     band = power[max(largest - wide, 0) : largest + wide + 1]
     amplitude = math.sqrt(2.0 * float(band.sum())) / n * problem.noise.encoder
     stated = replace(problem.noise, base_sway=amplitude, vibration=0.0).of_readings
-    if not sound(filtered((recording, replace(problem, noise=stated)))):
+    if not sound(filtered(recording, replace(problem, noise=stated))):
         return None
     hertz, seconds = (largest + 1) / (n * dt), math.degrees(amplitude) * 3600.0
     text = f"the encoders' readings swing with {hertz:.2g} Hz, by some {seconds:.2g} arcsec"
@@ -227,42 +213,41 @@ def _even(columns: Array, mean: float) -> bool:
     return True
 
 
-@once
-def _restless_gyros(case: Case) -> Explained | None:
-    """Gyro noise other than stated that explains the innovations, if any."""
-    case = short(case)
-    for octaves in (np.arange(0.5, 10.1, 0.5), -np.arange(0.5, 3.1, 0.5)):
-        fitting = dict[float, float]()
-        for factor in 2.0**octaves:
-            if (left := _left_by_walk(case, factor)) > LIMITS.risk:
-                fitting[float(factor)] = left
-            elif fitting:
-                break
-        if fitting:
-            low, high = min(fitting), max(fitting)
-            text = f"the gyros' angle random walk looks about {_two_digits(math.sqrt(low * high))} times what is stated"
-            more = f" ({_two_digits(low)} to {_two_digits(high)})" if len(fitting) > 1 else ""
-            larger = octaves[0] > 0.0
-            code, harm = ("excess_scatter", EVERYTHING) if larger else ("low_scatter", ())
-            found = Finding(code, text + more, harm=harm, action="state angle_random_walk so under [noise]")
-            return Explained(found, max(fitting.values()))
-    return None
+def _restless_gyros(recording: Recording, problem: FilterProblem, now: FilterResult) -> Explained | None:
+    """Gyro noise other than stated that explains the innovations, if any: half octaves are halved, by the correlation
+    of the encoders' innovations from row to row, which a walk that is too small makes positive."""
+    larger = _serial(regular(recording, now.innovations)) > 0.0
+    octaves = np.arange(0.5, 10.1, 0.5) if larger else -np.arange(0.5, 3.1, 0.5)[::-1]
+    fitting, low, high = dict[float, float](), 0, len(octaves) - 1
+    while low <= high:
+        k = (low + high) // 2
+        factor = float(2.0 ** octaves[k])
+        noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
+        then = filtered(recording, replace(problem, noise=noise))
+        z = regular(recording, then.innovations)
+        # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
+        fits = sound(then) and float(np.nanmean(np.square(then.innovations[:, 3:]))) > LIMITS.walk_square
+        if fits and (white := whiteness(z)) > LIMITS.risk:
+            fitting[factor] = white
+        low, high = (k + 1, high) if _serial(z) > 0.0 else (low, k - 1)
+    if not fitting:
+        return None
+    least, most = min(fitting), max(fitting)
+    text = f"the gyros' angle random walk looks about {_two_digits(math.sqrt(least * most))} times what is stated"
+    more = f" ({_two_digits(least)} to {_two_digits(most)})" if len(fitting) > 1 else ""
+    code, harm = ("excess_scatter", EVERYTHING) if larger else ("low_scatter", ())
+    found = Finding(code, text + more, harm=harm, action="state angle_random_walk so under [noise]")
+    return Explained(found, max(fitting.values()))
+
+
+def _serial(z: Array) -> float:
+    """Products of the encoders' innovations (n - 1, 3) with those of the next row, summed."""
+    return float(np.nansum(z[1:, 3:] * z[:-1, 3:]))
 
 
 def _two_digits(factor: float) -> str:
     """A number to two digits, without an exponent."""
     return f"{float(f'{factor:.2g}'):g}"
-
-
-def _left_by_walk(case: Case, factor: float) -> float:
-    """Whiteness of innovations (`Explained`) with a walk of the gyros larger by a factor; 0 if it explains none."""
-    recording, problem = case
-    noise = replace(problem.noise, angle_random_walk=factor * problem.noise.angle_random_walk)
-    now = filtered((recording, replace(problem, noise=noise)))
-    # half an octave too much makes squares of innovations half as large at most; a walk that is none, much smaller
-    if not sound(now) or not float(np.nanmean(np.square(now.innovations[:, 3:]))) > LIMITS.walk_square:
-        return 0.0
-    return whiteness(regular(recording, now))
 
 
 def _unexplained(z: Array) -> Finding:

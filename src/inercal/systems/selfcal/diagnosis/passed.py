@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.asked_pass import PassQuestion
 from inercal.foundation.inference.scores import ErrorColumns, PassSums, joined
-from inercal.systems.selfcal.diagnosis.questions import asked
+from inercal.systems.selfcal.diagnosis.questions import PlatformQuestion, Waves, asked
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.filters.whitened import whitened
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.recording import Recording
-from inercal.systems.selfcal.platform.states import ALL
+from inercal.systems.selfcal.platform.states import ALL, MOST_WAVES
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class PlatformPass:
     problem: FilterProblem
     result: FilterResult
     errors: tuple[str, ...]
-    questions: tuple[PassQuestion, ...]
+    questions: tuple[PlatformQuestion, ...]
     sums: PassSums
     z: Array
     covariance: Array
@@ -84,16 +83,21 @@ class PlatformPass:
         return self.sums.with_stated(joined([self.moved(each) for each in there]), np.ones(len(there)))
 
 
-def pass_of(recording: Recording, problem: FilterProblem, result: FilterResult) -> PlatformPass | None:
-    """The pass at the values of a filter's result; None where these are none."""
+def pass_of(
+    recording: Recording, problem: FilterProblem, result: FilterResult, waves: Waves = ()
+) -> PlatformPass | None:
+    """The pass at the values of a filter's result, with questions about ``waves`` of encoders; None where these are
+    none."""
     u = np.sqrt(np.maximum(np.diag(result.covariance), 0.0))
     if not (result.converged and np.isfinite(result.coefficients).all() and (u > 0.0).all()):
         return None
     if not result.dims.any():
         return None
-    table = asked(recording, problem)
+    table = asked(recording, problem, waves)
+    harmonics = (*problem.states.harmonics, *waves)
+    wide = replace(problem, vector=replace(problem.states, harmonics=harmonics)) if waves else problem
     try:
-        made = whitened(recording, problem, result.coefficients, u, table.errors, result.restarts)
+        made = whitened(recording, wide, result.coefficients, u, table.errors, result.restarts)
         sums = made.sums
         usable = bool(np.isfinite(made.covariance).all() and np.isfinite(sums.change).all())
     except (np.linalg.LinAlgError, ZeroDivisionError):  # an accelerometer without a scale
@@ -105,23 +109,25 @@ def pass_of(recording: Recording, problem: FilterProblem, result: FilterResult) 
     )
 
 
-def periodic(passed: PlatformPass) -> bool:
-    """True where an encoder seems to err with a period of its angle, of any of `LIMITS.harmonic_orders`: Fisher's
-    ordinates of a periodogram, exponential where innovations are white."""
+def periodic(passed: PlatformPass) -> list[tuple[int, int]]:
+    """Joints whose encoders seem to err with a period of their angle, and which of `LIMITS.harmonic_orders` most:
+    Fisher's ordinates of a periodogram, exponential where innovations are white."""
     th, z = passed.recording.th[1:], passed.z[:, 3:]
     there = np.isfinite(z).all(axis=1) & np.isfinite(th).all(axis=1)
     th, z = th[there], z[there]
     if not len(th):
-        return False
+        return []
     _, joints = gimbals(th, passed.problem.world)
-    alternatives = 3 * LIMITS.harmonic_orders
+    alternatives, waves = 3 * LIMITS.harmonic_orders, list[tuple[int, int]]()
     for joint in range(3):
         by = np.einsum("kij,ki->kj", joints, z)[:, joint]  # not quite the joint's own, yet white
         wave, once = np.exp(1j * th[:, joint]), np.exp(1j * th[:, joint])
         turned, size = float(np.ptp(th[:, joint])), float(np.sum(np.square(by)))
+        powers = np.zeros(LIMITS.harmonic_orders)
         for order in range(1, LIMITS.harmonic_orders + 1):
-            power = abs(np.sum(wave * by)) ** 2 / max(size, 1e-300)
+            if order * turned > math.pi:
+                powers[order - 1] = abs(np.sum(wave * by)) ** 2 / max(size, 1e-300)
             wave = wave * once
-            if order * turned > math.pi and power > math.log(alternatives / LIMITS.risk):
-                return True
-    return False
+        if powers.max() > math.log(alternatives / LIMITS.risk):
+            waves.append((joint, 1 + int(np.argmax(powers))))
+    return waves[: MOST_WAVES - len(passed.problem.states.harmonics)]

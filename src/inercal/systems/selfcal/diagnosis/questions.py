@@ -8,22 +8,36 @@ would be taken for a fault. A course is 0 where its fault does nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.geometry.rotations import conjugate, rotate
-from inercal.foundation.inference.asked_pass import PassQuestion
 from inercal.foundation.inference.scores import ErrorColumns
+from inercal.systems.selfcal.diagnosis.catalogue import (
+    LATE,
+    WANDERING,
+    WORDS,
+    Naming,
+    directions,
+    late,
+    of_asymmetry,
+    of_commands,
+    of_encoder,
+    of_kind,
+    of_latitude,
+    of_wandering,
+)
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
 from inercal.systems.selfcal.filters.whitened import BLOCKS, PassErrors
 from inercal.systems.selfcal.limits import LIMITS
+from inercal.systems.selfcal.platform.kinematics import axes_of
 from inercal.systems.selfcal.platform.recording import Recording
-from inercal.systems.selfcal.platform.states import ALL, KIND_OF, STATES, TEMPERATURE, WAVE
+from inercal.systems.selfcal.platform.states import ALL, KIND_OF, STATES, TEMPERATURE, WAVE, twins
 
 _SENSORS: Final = ("gyro", "accelerometer", "encoder")
 
@@ -35,16 +49,6 @@ _TURNS: Final = {
     8: "8 times a turn",
 }
 
-_NAMED: Final = (
-    "The reading of encoder x changes",
-    "The reading of encoder y changes",
-    "The reading of encoder z changes",
-    "The gyros differ in scale between",
-    "The accelerometers differ in scale between",
-    "The accelerometers curve",
-)
-"""Beginnings of the sentences of questions that a hypothesis says, too."""
-
 _LAGS: Final = (10.0, 60.0)
 """Times [s] by which a reading follows its load, and the square of it."""
 
@@ -55,10 +59,19 @@ _STEPS: Final = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 """Places of steps that are asked for, over the length of a record."""
 
 
+_ASYMMETRY: Final = "The accelerometers differ in scale between their signs"
+
+_SWAY: Final = "sway slowly"
+
+Waves = Sequence[tuple[int, int]]
+"""Joints 0, 1, 2 and numbers of periods a turn."""
+
+
 class RowSignals(NamedTuple):
     """Signals of a recording that courses are made of: ``load`` (9, n) of gyros, accelerometers and encoders over the
     largest of a sensor, ``change`` (9, n) of it from row to row, what follows it with a lag, ``lagging`` (9, n), and
-    its square, ``warm`` (9, n); angles ``th`` (n, 3) [rad] and the ``sense`` (n, 3) in which each joint turns."""
+    its square, ``warm`` (9, n); angles ``th`` (n, 3) [rad] and the ``sense`` (n, 3) in which each joint turns; ``top``
+    (3,) the largest load of gyros [rad/s], accelerometers [m/s^2] and encoders [rad/s]."""
 
     load: Array
     change: Array
@@ -66,11 +79,23 @@ class RowSignals(NamedTuple):
     warm: Array
     th: Array
     sense: Array
+    top: Array
 
     def rows(self, rows: slice) -> RowSignals:
         """Some rows."""
         load, change, lagging, warm = (signal[:, rows] for signal in self[:4])
-        return RowSignals(load, change, lagging, warm, self.th[rows], self.sense[rows])
+        return RowSignals(load, change, lagging, warm, self.th[rows], self.sense[rows], self.top)
+
+
+class PlatformQuestion(NamedTuple):
+    """A question: the ``cell`` order, place, reading or history, or ``rig``; its ``sentence`` without a full stop;
+    and the ``columns`` of the pass. ``naming`` says the cause where physics has one, believed up to a size ``most``."""
+
+    cell: str
+    sentence: str
+    columns: ErrorColumns
+    naming: Naming | None = None
+    most: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +103,7 @@ class PassQuestions:
     """PassErrors of a pass, and the questions about their columns."""
 
     errors: PassErrors
-    questions: tuple[PassQuestion, ...]
+    questions: tuple[PlatformQuestion, ...]
 
 
 def _signals(recording: Recording, problem: FilterProblem) -> RowSignals:
@@ -96,10 +121,11 @@ def _signals(recording: Recording, problem: FilterProblem) -> RowSignals:
     th = turned + _smoothed(th - turned, _SMOOTHED)  # as driven, without noise
     top = max(float(np.abs(speed).max()), 1e-300)
     sense = np.where(np.abs(speed) > 0.05 * top, np.sign(speed), 0.0)
-    load = np.concatenate([(x / max(float(np.abs(x).max()), 1e-300)).T for x in (w, f, speed)])
+    tops = np.array([max(float(np.abs(x).max()), 1e-300) for x in (w, f, speed)])
+    load = np.concatenate([(x / top).T for x, top in zip((w, f, speed), tops, strict=True)])
     shares = [min(float(np.median(np.diff(t))) / lag, 0.5) for lag in _LAGS]
     lagging, warm = (_lagging(x, share) for share, x in zip(shares, (load, load**2), strict=True))
-    return RowSignals(load, np.diff(load, prepend=load[:, :1]), lagging - load, warm, th, sense)
+    return RowSignals(load, np.diff(load, prepend=load[:, :1]), lagging - load, warm, th, sense, tops)
 
 
 def _smoothed(x: Array, n: int) -> Array:
@@ -145,7 +171,7 @@ def _courses(of: RowSignals, channel: int, joints: tuple[int, ...]) -> Iterator[
 
 
 def rig_names(recording: Recording, problem: FilterProblem) -> tuple[str, ...]:
-    """PassErrors of the rig that a problem does not fit, of those that are constant."""
+    """Errors of the rig that a problem does not fit, of those that are constant."""
     warm = recording.warm is not None and float(np.ptp(recording.warm)) > 0.0
     named = ALL[18 : WAVE + 2 * len(problem.states.harmonics)]
     return tuple(
@@ -153,8 +179,11 @@ def rig_names(recording: Recording, problem: FilterProblem) -> tuple[str, ...]:
     )
 
 
-def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
-    """All errors and questions about a recording and its problem."""
+def asked(recording: Recording, problem: FilterProblem, waves: Waves = ()) -> PassQuestions:
+    """All errors and questions about a recording and its problem, with those about ``waves``: joints whose encoders
+    seem to err so many times a turn."""
+    harmonics = problem.states.harmonics
+    problem = replace(problem, vector=replace(problem.states, harmonics=(*harmonics, *waves)))
     signals, rig = _signals(recording, problem), rig_names(recording, problem)
     turning = tuple(j for j in range(3) if float(np.ptp(signals.th[:, j])) > LIMITS.place_turn)
 
@@ -177,22 +206,73 @@ def asked(recording: Recording, problem: FilterProblem) -> PassQuestions:
         return np.ascontiguousarray(np.stack(found, axis=1))
 
     errors = PassErrors(rig, True, tuple(counts.tolist()), courses)
-    questions = [
-        PassQuestion(cell, sentence, ErrorColumns(np.array(at)), sentence.startswith(_NAMED))
-        for (cell, sentence), at in places.items()
-    ]
-    kinds = np.array([KIND_OF[name] for name in rig])
-    for kind in dict.fromkeys(kinds.tolist()):
-        if kind == "harmonics":  # of angles as read; those of encoders are asked by place
+    return PassQuestions(
+        errors,
+        (
+            *_of_courses(places, float(np.median(recording.dt)), signals.top),
+            *_of_site(problem, len(rig)),
+            *_of_rig(recording, problem, rig, len(waves)),
+            *_by_order(problem),
+        ),
+    )
+
+
+def _of_courses(
+    places: Mapping[tuple[str, str], list[int]], dt: float, top: Array
+) -> Iterator[PlatformQuestion]:
+    """Questions about the courses at ``places`` of a pass; ``dt`` [s] between rows, ``top`` as of `RowSignals`."""
+    for (cell, sentence), at in places.items():
+        columns, naming = ErrorColumns(np.array(at)), None
+        if sentence == _ASYMMETRY:
+            naming = of_asymmetry(2.0 / float(top[1]))
+        for joint, axis in enumerate("xyz"):
+            for order, words in _TURNS.items():
+                if sentence == f"The reading of encoder {axis} changes with th_{axis} {words}":
+                    naming = of_encoder(joint, order)
+        yield PlatformQuestion(cell, sentence, columns, naming)
+        if sentence == "The gyros keep a part of the reading before":
+            alike = ErrorColumns(np.array(at), by=np.ones((3, 1)))
+            yield PlatformQuestion(
+                "history", "The commands are late", alike, of_commands(-dt / float(top[0]))
+            )
+
+
+def _of_site(problem: FilterProblem, first: int) -> Iterator[PlatformQuestion]:
+    """The earth rate, whose columns begin at ``first``."""
+    at = first + np.arange(3)
+    by = np.stack(directions(problem.world), axis=1)
+    sentence = "The earth rate is not that of the latitude"
+    yield PlatformQuestion("place", sentence, ErrorColumns(at, by=by), of_latitude(problem.world))
+
+
+def _of_rig(
+    recording: Recording, problem: FilterProblem, rig: tuple[str, ...], waves: int
+) -> Iterator[PlatformQuestion]:
+    """Errors of the rig, without those that nobody can tell from others of them on this path; the last ``waves``
+    harmonics are asked for, of those before encoders are asked by place."""
+    still = np.nanmax(recording.th, axis=0) - np.nanmin(recording.th, axis=0) < LIMITS.still_joint
+    axes = axes_of(recording.th[0], problem.world.axes, problem.world.signs).tolist()
+    hidden = twins(tuple(WORDS), np.flatnonzero(still).tolist(), axes)
+    for kind in WORDS:
+        names = tuple(name for name in STATES[kind].parameters if name in rig and name not in hidden)
+        if not names or any(name in problem.names for name in STATES[kind].parameters):
             continue
-        sentence = f"The rig has {STATES[kind].words} that are no states".replace(
-            ", in the extended model", ""
-        )
-        questions.append(PassQuestion("rig", sentence, ErrorColumns(np.flatnonzero(kinds == kind)), True))
-    return PassQuestions(errors, (*questions, *_by_order(problem)))
+        sentence = f"The rig has {STATES[kind].words} that are no states"
+        columns = ErrorColumns(np.array([rig.index(name) for name in names]))
+        yield PlatformQuestion("rig", sentence, columns, of_kind(kind, names))
+    for name in LATE:
+        if name in rig:
+            columns = ErrorColumns(np.array([rig.index(name)]))
+            most = LIMITS.small_delay
+            yield PlatformQuestion("rig", f"The {LATE[name]} are late", columns, late(name), most)
+    harmonics = problem.states.harmonics
+    for k in range(len(harmonics) - waves, len(harmonics)):
+        at = np.array([rig.index(f"harmonic_{k + 1}_{part}") for part in ("sin", "cos")])
+        sentence = "The reading of an encoder changes with its angle"
+        yield PlatformQuestion("place", sentence, ErrorColumns(at), of_encoder(*harmonics[k]))
 
 
-def _by_order(problem: FilterProblem) -> Iterator[PassQuestion]:
+def _by_order(problem: FilterProblem) -> Iterator[PlatformQuestion]:
     """Drift, bend, sway, settling and steps of the fitted values, by their kind."""
     tau = (np.arange(BLOCKS) + 0.5) / BLOCKS
     x = 2.0 * tau - 1.0
@@ -200,16 +280,14 @@ def _by_order(problem: FilterProblem) -> Iterator[PassQuestion]:
         "drift over the record": x[:, None],
         "bend over the record": np.stack([x, x**2, x**3], axis=1),
         "settle at the start": np.exp(-tau[:, None] / [0.05, 0.25]),
-        "sway slowly": np.cos(math.pi * tau[:, None] * np.arange(1, 7)),
+        _SWAY: np.cos(math.pi * tau[:, None] * np.arange(1, 7)),
     } | {f"step at {100 * at:.0f} % of the record": (tau > at).astype(float)[:, None] for at in _STEPS}
     kinds = np.array(
         [KIND_OF[name] for name, walks in zip(problem.names, problem.states.walks, strict=True) if not walks]
     )
     for kind in dict.fromkeys(kinds.tolist()):
         for words, course in shapes.items():
-            yield PassQuestion(
-                "order",
-                f"The values {kind} {words}",
-                ErrorColumns(np.flatnonzero(kinds == kind), course),
-                kind in ("kg0", "ka0"),
-            )
+            wanders = kind in WANDERING and words == _SWAY
+            naming = of_wandering(kind, course) if wanders else None
+            columns = ErrorColumns(np.flatnonzero(kinds == kind), course)
+            yield PlatformQuestion("order", f"The values {kind} {words}", columns, naming)

@@ -1,7 +1,7 @@
 """Gross faults of rows: readings logged late, once too often, not at all, or far off.
 
-Each is judged by the error-state filter, not here. Angles and commands are compared from row to row by the rotation in
-between (`Turning`).
+Each is judged by the error-state filter, not here; what angles and commands speak against, compared from row to row by
+the rotation in between (`Turning`), is not tried.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.findings import EVERYTHING
+from inercal.foundation.findings import EVERYTHING, Finding
 from inercal.foundation.geometry.rotations import boxminus, conjugate, rotate
 from inercal.foundation.inference.consistency import surprising
-from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.foundation.records.places import counted, places
-from inercal.systems.selfcal.diagnosis.fit_quality import Case, filtered
+from inercal.systems.selfcal.diagnosis.fit_quality import filtered
 from inercal.systems.selfcal.filters.filter_result import FilterResult
 from inercal.systems.selfcal.filters.problem import FilterProblem
 from inercal.systems.selfcal.filters.residuals import gimbals
@@ -39,24 +39,21 @@ def _fault(
     left_out: int = 0,
     times: int = 1,
     where: str = "",
-) -> Hypothesis[Case]:
-    """A fault, and the recording without it."""
-
-    def without(case: Case, _: Array) -> Case:
-        return repaired, case[1]
-
+) -> GrossFault:
+    """A fault, and the recording without it; picked of so many ``alternatives``, so many ``times``, without
+    ``left_out`` scalars."""
     harm = () if code == "gap" else EVERYTHING
-    return Hypothesis(
-        text,
-        code,
-        text,
-        without,
-        alternatives=alternatives,
-        times=times,
-        left_out=left_out,
-        where=where,
-        harm=harm,
-    )
+    chance = left_out + 2.0 * times * math.log(alternatives / LIMITS.risk)
+    return GrossFault(Finding(code, text, where, harm), repaired, chance)
+
+
+class GrossFault(NamedTuple):
+    """A fault with its ``finding``, the recording ``without`` it, and the fall of the sum of NIS by ``chance``: the
+    likelihood ratio of two models exceeds 1/r by chance with probability r at most (Markov)."""
+
+    finding: Finding
+    without: Recording
+    chance: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +101,8 @@ def turning(recording: Recording, problem: FilterProblem) -> Turning:
     )
 
 
-def faults_of_rows(case: Case) -> Iterator[Hypothesis[Case]]:
+def faults_of_rows(recording: Recording, problem: FilterProblem) -> Iterator[GrossFault]:
     """Faults of stretches of rows."""
-    recording, problem = case
     turn = turning(recording, problem)
     yield from _shifts(recording, turn)
     yield from _late_accelerometers(recording, turn)
@@ -115,7 +111,7 @@ def faults_of_rows(case: Case) -> Iterator[Hypothesis[Case]]:
     yield from _missing_rows(recording, turn)
 
 
-def _shifts(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
+def _shifts(recording: Recording, turn: Turning) -> Iterator[GrossFault]:
     """A command log shifted by some rows, throughout or from a row on."""
     n = len(recording.rate)
     rows = np.arange(n)
@@ -127,10 +123,13 @@ def _shifts(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
     plain = off(0)
     by_shift = {shift: off(shift) for shift in _SHIFTS}
     whole = min(_SHIFTS, key=lambda shift: by_shift[shift].sum())
-    yield _shifted(recording, whole, 0, len(_SHIFTS))
+    if by_shift[whole].sum() < plain.sum():
+        yield _shifted(recording, whole, 0, len(_SHIFTS))
     # squares before a row without the shift, from it on with it
     gain = {shift: np.cumsum((plain - squares)[::-1])[::-1] for shift, squares in by_shift.items()}
     part = max(_SHIFTS, key=lambda shift: gain[shift].max())
+    if gain[part].max() < (LIMITS.noise_sigmas * turn.noise) ** 2:
+        return
     # where rates are steady a shift hardly shows: the last row from which it may begin, and some before
     last = int(np.flatnonzero(gain[part] >= gain[part].max() - (LIMITS.noise_sigmas * turn.noise) ** 2)[-1])
     for first in last - np.append(0, 5 * 2 ** np.arange(10)):
@@ -138,7 +137,7 @@ def _shifts(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
             yield _shifted(recording, part, int(first), len(_SHIFTS) * n)
 
 
-def _shifted(recording: Recording, shift: int, first: int, alternatives: float) -> Hypothesis[Case]:
+def _shifted(recording: Recording, shift: int, first: int, alternatives: float) -> GrossFault:
     """The recording with its commands from row ``first`` on taken ``shift`` rows further down."""
     rate = recording.rate.copy()
     last = len(rate) - 1
@@ -149,7 +148,7 @@ def _shifted(recording: Recording, shift: int, first: int, alternatives: float) 
     return _fault("command_shift", text, replace(recording, rate=rate), alternatives, where=where)
 
 
-def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
+def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[GrossFault]:
     """Accelerometers logged some rows late or early: the shift that agrees best with the encoders."""
     moved = {shift: _by_rows(recording.acc, shift) for shift in _SHIFTS}
 
@@ -158,6 +157,9 @@ def _late_accelerometers(recording: Recording, turn: Turning) -> Iterator[Hypoth
         return float(np.nanmean(np.square(apart))) if np.isfinite(apart).any() else math.inf
 
     shift = min(_SHIFTS, key=off)
+    apart = recording.acc - turn.up
+    if not np.isfinite(apart).any() or off(shift) > float(np.nanmean(np.square(apart))):
+        return
     how = "late" if shift > 0 else "early"
     text = f"accelerometers are logged {counted(abs(shift), 'row')} {how}, against angles and commands"
     left_out = int(np.isfinite(recording.acc).sum() - np.isfinite(moved[shift]).sum())
@@ -174,7 +176,7 @@ def _by_rows(values: Array, shift: int) -> Array:
     return out
 
 
-def _frozen(recording: Recording) -> Iterator[Hypothesis[Case]]:
+def _frozen(recording: Recording) -> Iterator[GrossFault]:
     """Readings that repeat, of all sensors, the accelerometers, or one of them: the longest run, as a coarse one has
     many."""
     n = len(recording.acc)
@@ -195,7 +197,7 @@ def _frozen(recording: Recording) -> Iterator[Hypothesis[Case]]:
             yield _fault("dead_channel", text, without, 2.5 * n * n, left_out, where=where)
 
 
-def _stuck(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
+def _stuck(recording: Recording, turn: Turning) -> Iterator[GrossFault]:
     """An encoder that stands still while its joint is commanded to turn."""
     n = len(recording.th)
     for joint, name in enumerate(JOINTS):
@@ -229,7 +231,7 @@ def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def _stuck_encoder(
     recording: Recording, rows: NDArray[np.int64], text: str, where: str, alternatives: float
-) -> Hypothesis[Case]:
+) -> GrossFault:
     """An encoder that is wrong in some rows, in which no angle is used."""
     th = recording.th.copy()
     left_out = int(np.isfinite(th[rows]).sum())
@@ -237,7 +239,7 @@ def _stuck_encoder(
     return _fault("stuck_encoder", text, replace(recording, th=th), alternatives, left_out, where=where)
 
 
-def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Case]]:
+def _missing_rows(recording: Recording, turn: Turning) -> Iterator[GrossFault]:
     """Rows that are missing though time goes on evenly: a step of the angles that is a multiple of the command."""
     size = np.square(turn.commanded).sum(axis=1)
     fast = turn.jumps & (size > (LIMITS.noise_sigmas * turn.noise) ** 2)
@@ -262,32 +264,36 @@ def _missing_rows(recording: Recording, turn: Turning) -> Iterator[Hypothesis[Ca
     yield _fault("gap", text, repaired, alternatives, times=len(rows), where=where)
 
 
-def single_readings(case: Case, now: FilterResult) -> Iterator[Hypothesis[Case]]:
-    """Single readings far from what the filter expects, left out one row after the other: an early one spoils
-    those after it."""
-    recording, problem = case
+def single_readings(recording: Recording, problem: FilterProblem, now: FilterResult) -> GrossFault | None:
+    """Single readings far from what the filter expects, left out: in each round the first of those near each other, for
+    an early one spoils those after it."""
     rows = np.zeros(0, dtype=np.int64)
     left_out = 0
     channels = set[str]()
     acc, th = recording.acc.copy(), recording.th.copy()
-    while now.converged and len(off := surprising(now.nis, now.dims, LIMITS.risk)):
-        row = int(off[0])
-        wrong = np.abs(now.innovations[row]) > LIMITS.single_sigmas
-        if len(rows) == LIMITS.single_rows or not wrong.any():
-            return
-        if wrong[3:].any():
-            th[row + 1] = np.nan
-            channels.add("th")
-        else:
-            acc[row + 1, wrong[:3]] = np.nan
-            channels |= {f"acc_{axis}" for axis, each in zip("xyz", wrong[:3], strict=True) if each}
-        rows = np.append(rows, row)
-        left_out += 3 if wrong[3:].any() else int(wrong[:3].sum())
-        now = filtered((replace(recording, acc=acc.copy(), th=th.copy()), problem))
+    for _ in range(LIMITS.single_rounds):
+        off = surprising(now.nis, now.dims, LIMITS.risk) if now.converged else rows[:0]
+        if not len(off):
+            break
+        first = off[np.diff(off, prepend=-LIMITS.stuck_rows - LIMITS.single_apart) > LIMITS.single_apart]
+        wrong = np.abs(now.innovations[first]) > LIMITS.single_sigmas
+        if len(rows) + len(first) > LIMITS.single_rows or not wrong.any(axis=1).all():
+            return None
+        of_th = np.asarray(wrong[:, 3:].any(axis=1))
+        th[first[of_th] + 1] = np.nan
+        of_acc = np.asarray(wrong[:, :3] & ~of_th[:, None])
+        acc[1:][first[:, None], np.arange(3)] = np.where(of_acc, np.nan, acc[1:][first])
+        channels |= {"th"} if of_th.any() else set()
+        channels |= {
+            f"acc_{axis}" for axis, there in zip("xyz", np.any(of_acc, axis=0).tolist(), strict=True) if there
+        }
+        rows = np.append(rows, first)
+        left_out += 3 * int(of_th.sum()) + int(of_acc.sum())
+        now = filtered(replace(recording, acc=acc.copy(), th=th.copy()), problem)
     rows = np.unique(rows)
     if not len(rows) or (len(rows) > 3 and np.ptp(rows) < 2 * len(rows)):
-        return  # a change, not single readings
+        return None  # a change, not single readings
     where = ", ".join(sorted(channels))
     text = f"{counted(len(rows), 'reading')} far from what the filter expects, of {where}"
     repaired, where = replace(recording, acc=acc, th=th), places("row", rows + 2)
-    yield _fault("outlier", text, repaired, 2.0 * len(recording.t), left_out, len(rows), where)
+    return _fault("outlier", text, repaired, 2.0 * len(recording.t), left_out, len(rows), where)

@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.inference.hypotheses import Hypothesis
 from inercal.foundation.instruments.terms import shown_unit
 from inercal.foundation.results.budget import TypeA, TypeB
 from inercal.foundation.units import parse_quantity, parse_unit
 from inercal.systems.selfcal.before.bounds import SOURCES, PathBounds
-from inercal.systems.selfcal.diagnosis.fit_quality import Case
 from inercal.systems.selfcal.diagnosis.passed import PlatformPass
-from inercal.systems.selfcal.filters.problem import problem
+from inercal.systems.selfcal.filters.problem import FilterProblem, problem
 from inercal.systems.selfcal.filters.whitened import whitened
 from inercal.systems.selfcal.limits import LIMITS
 from inercal.systems.selfcal.platform.coefficients import product_slope
@@ -114,34 +112,9 @@ def _moved(settings: SelfcalSettings, by: float) -> SelfcalSettings:
     )
 
 
-def stated_errors(settings: SelfcalSettings) -> Hypothesis[Case] | None:
-    """Errors of the inputs stated with an uncertainty, in units of that; None where all are exact.
-
-    They are small enough for changes of earth rate and gravity to add up.
-    """
-    uncertain = [each for each in systematic_inputs(settings) if each.u]
-    if not uncertain:
-        return None
-    here = settings.world
-
-    def without(case: Case, values: Array) -> Case:
-        recording, problem = case
-        earth, up, stated = problem.world.earth, problem.world.up, problem.states.stated
-        for each, value in zip(uncertain, values, strict=True):
-            if value != 0.0:
-                there = each.changed(float(value) * each.u)
-                if each.of_rig:
-                    stated = stated + there.states.stated - settings.states.stated
-                else:
-                    earth, up = earth + there.world.earth - here.earth, up + there.world.up - here.up
-        vector = replace(problem.states, stated=stated)
-        world = problem.world._replace(earth=earth, up=up)
-        return recording, replace(problem, world=world, vector=vector)
-
-    names = tuple(each.name for each in uncertain)
-    return Hypothesis(
-        "stated", "site_suspect", "what is stated of site and base", without, names, 0.1, prior=1.0
-    )
+def stated_errors(settings: SelfcalSettings) -> list[FilterProblem]:
+    """The problem with each input that is stated with an uncertainty moved by that, one after the other."""
+    return [problem(given.changed(given.u)) for given in systematic_inputs(settings) if given.u]
 
 
 def bounds_of(passed: PlatformPass) -> PathBounds:

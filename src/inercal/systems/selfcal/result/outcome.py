@@ -12,8 +12,8 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import CODES, EVERYTHING, Finding, Status, causes
 from inercal.foundation.inference.consistency import Nis, nis
-from inercal.foundation.inference.hypotheses import sigmas
 from inercal.foundation.inference.identifiability import HALF_SEEN, UNSEEN
+from inercal.foundation.inference.limits import LIMITS as INFERENCE
 from inercal.foundation.records.places import counted
 from inercal.foundation.results.basis import Formula, conditions_of, studied
 from inercal.foundation.results.budget import BudgetItem, combine
@@ -21,6 +21,7 @@ from inercal.foundation.results.remarks import at_prior, exact_inputs, missed, r
 from inercal.foundation.results.result import Estimate
 from inercal.systems.selfcal.before.bounds import PathBounds, recorded_bounds
 from inercal.systems.selfcal.before.observability import Observability, not_positive, observability, useless
+from inercal.systems.selfcal.diagnosis.examination import with_stated
 from inercal.systems.selfcal.diagnosis.passed import PlatformPass, pass_of
 from inercal.systems.selfcal.estimators import ESTIMATORS, FACTOR_OF
 from inercal.systems.selfcal.filters.filter_result import FilterResult
@@ -30,7 +31,7 @@ from inercal.systems.selfcal.platform.coefficients import NAMES, product_slope, 
 from inercal.systems.selfcal.platform.recording import Recording
 from inercal.systems.selfcal.platform.rig import JOINTS
 from inercal.systems.selfcal.platform.states import ALL, BIAS_WALK, EXTENDED_MODEL, KIND_OF, STATES, UNIT_OF
-from inercal.systems.selfcal.result.budget import considered, systematic, systematic_inputs, within
+from inercal.systems.selfcal.result.budget import considered, stated_errors, systematic, within
 from inercal.systems.selfcal.result.unmodelled import SOURCE as UNMODELLED
 from inercal.systems.selfcal.result.unmodelled import unmodelled
 from inercal.systems.selfcal.settings import SelfcalSettings
@@ -107,7 +108,12 @@ def assemble(
         "compare": {},
     }
     slope, values = product_slope(filtered.coefficients), to_product(filtered.coefficients)
+    agreement = nis(filtered.nis, filtered.dims) if filtered.dims.any() else None
+    limit = 0.0 if agreement is None else _limit(agreement, passed, settings)
+    misfit = 1.0 if agreement is None else _misfit(agreement, limit)
     by_filter = slope @ filtered.covariance @ slope.T
+    if misfit <= INFERENCE.gross:
+        by_filter *= misfit**2
     if (unusable := useless(filtered, bounds, by_filter)) is not None:
         return Estimate.without(basis, *unusable, findings=all_findings, result=result)
 
@@ -139,7 +145,7 @@ def assemble(
     u = uncertainty.u
 
     judged = observability(replace(bounds, covariance=by_filter), settings.goal)
-    agreement = nis(filtered.nis, filtered.dims)
+    assert agreement is not None
     hidden = _hidden(judged, u / bounds.prior, uncertainty.budget)
     result["at_prior"] = [name for name in filtered.names if name in {*judged.at_prior, *hidden}]
     result["goal"] = reached(filtered.names, u, settings.goal)
@@ -147,8 +153,12 @@ def assemble(
     # of biases that walk no recording tells more
     left = {name: part for name, part in judged.at_prior.items() if KIND_OF[name] not in BIAS_WALK}
     all_findings += at_prior(left, hints)
-    limit = _limit(agreement, passed, settings)
-    status, message = _verdict(judged, agreement, limit, _cause(findings, recording.findings), hints)
+    status, message = _verdict(judged, misfit, _cause(findings, recording.findings), hints, agreement)
+    if misfit > 1.0 and status is not Status.INCONSISTENT:
+        text = f"Innovations are {misfit:.3g} times what noise explains, and u allows for it."
+        all_findings.append(
+            Finding("excess_scatter", text, harm=(), action="State the noise as it is under [noise].")
+        )
     # numbers that must not be used need no more findings
     if status is not Status.INCONSISTENT:
         all_findings += missed(result["goal"], UNIT_OF, hints)
@@ -211,9 +221,9 @@ def verdict(
         passed = pass_of(recording, problem(settings), filtered)
     agreement = nis(filtered.nis, filtered.dims)
     cause = _cause(findings, recording.findings)
-    limit = _limit(agreement, passed, settings)
+    misfit = _misfit(agreement, _limit(agreement, passed, settings))
     hints = _hardly_turned(recording, settings) | _gated(recording, settings, filtered, bounds)
-    return _verdict(observability(bounds, {}), agreement, limit, cause, hints)
+    return _verdict(observability(bounds, {}), misfit, cause, hints, agreement)
 
 
 def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
@@ -225,28 +235,28 @@ def _cause(diagnosed: Sequence[Finding], recorded: Sequence[Finding]) -> str:
 def _limit(agreement: Nis, passed: PlatformPass | None, settings: SelfcalSettings) -> float:
     """Largest mean NIS of a recording that does not contradict the model: that of an exact study, plus the part that
     disappears with systematic inputs moved, within their uncertainties, to where the recording fits best."""
-    moved = [
-        problem(given.changed(given.u))
-        for given in (systematic_inputs(settings) if passed else ())
-        if given.u
-    ]
-    if passed is None or not moved:
+    if passed is None or not (moved := stated_errors(settings)):
         return agreement.limit(LIMITS.nis_sigmas)
-    stated = passed.with_stated(moved)
-    if not np.abs(stated.change[-len(moved) :]).max() <= sigmas(LIMITS.risk, len(moved)):
-        return agreement.limit(LIMITS.nis_sigmas)  # further than chance takes them
+    stated = with_stated(passed, moved)
     gained = passed.sums.chi2 - stated.chi2
     return agreement.limit(LIMITS.nis_sigmas) + max(0.0, gained) / agreement.rows
 
 
+def _misfit(agreement: Nis, limit: float) -> float:
+    """Innovations over what noise explains, 1 where their mean NIS is below the ``limit``: u grows by it."""
+    if not agreement.mean > limit:
+        return 1.0
+    stated = limit - agreement.limit(LIMITS.nis_sigmas)
+    return math.sqrt(max((agreement.mean - stated) / agreement.expected, 1.0))
+
+
 def _verdict(
-    judged: Observability, agreement: Nis, limit: float, cause: str, hints: Mapping[str, str]
+    judged: Observability, misfit: float, cause: str, hints: Mapping[str, str], agreement: Nis
 ) -> tuple[Status, str]:
     """Status and sentence of numbers that can be used."""
-    if agreement.mean > limit:
+    if misfit > INFERENCE.gross:
         return Status.INCONSISTENT, (
-            f"the recording contradicts the model: mean NIS {agreement.mean:.4g}, expected {agreement.expected:.4g} "
-            f"and at most {limit:.4g}; {cause}"
+            f"the recording contradicts the model: innovations are {misfit:.3g} times what noise explains; {cause}"
         )
     ratio = judged.learned.ratio[: len(NAMES)]
     unseen = [name for name, left in zip(NAMES, ratio, strict=True) if left > UNSEEN]

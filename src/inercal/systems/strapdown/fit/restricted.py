@@ -44,7 +44,7 @@ from inercal.systems.strapdown.fit.batch import (
     variances_of,
 )
 from inercal.systems.strapdown.fit.rests import Nodes
-from inercal.systems.strapdown.fit.unmodelled import DRIFT, TestedEffect, drifts, posed, tests
+from inercal.systems.strapdown.fit.unmodelled import TestedEffect, posed, tests
 from inercal.systems.strapdown.limits import LIMITS
 from inercal.systems.strapdown.model.samples import Samples
 from inercal.systems.strapdown.settings import TURN_NOISE, WALKS, Noise, StrapdownSettings
@@ -226,11 +226,11 @@ def _iterated(
 
 class ShownNoise(NamedTuple):
     """A study with the noise that it left to the recording, of which ``estimate`` then names what was found, the fit
-    with that, and the ``ramps`` that were shown before biases could walk."""
+    with that, and the last fit whose biases do not walk, ``still``."""
 
     settings: StrapdownSettings
     fit: Fit
-    ramps: tuple[TestedEffect, ...]
+    still: Fit
 
 
 def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings, fitted: Fit) -> ShownNoise:
@@ -242,29 +242,28 @@ def with_noise_shown(samples: Samples, nodes: Nodes, settings: StrapdownSettings
     asked = [name for name in settings.noise.estimate if getattr(settings.noise, name) == 0.0]
     turns = tuple(name for name in TURN_NOISE if name in asked and residuals(fitted)[1] > LIMITS.turn_excess)
     walks = tuple(name for name in WALKS if name in asked)
-    shown = ShownNoise(replace(settings, noise=replace(settings.noise, estimate=())), fitted, ())
+    shown = ShownNoise(replace(settings, noise=replace(settings.noise, estimate=())), fitted, fitted)
     for names in (turns, (*walks, *turns) if walks else ()):
         found = with_noise(samples, nodes, shown.settings, shown.fit, names) if names else None
         if not found:
             continue
         problem = posed(shown.fit, shown.settings)
         if not _by_others(shown.fit, tests(problem), found.gain, found.noise.walks):
-            ramps = drifts(problem, found.noise)
             noise = replace(found.noise, estimate=names)
-            shown = ShownNoise(replace(settings, noise=noise), found.fit, tuple(ramps))
+            still = shown.fit if found.noise.walks else found.fit
+            shown = ShownNoise(replace(settings, noise=noise), found.fit, still)
     return shown
 
 
 def _by_others(fitted: Fit, tested: list[TestedEffect], gain: float, walks: bool) -> bool:
     """True where an effect outside the model that is more than chance, or a wider prior of what lies far outside its
-    own, explains more than noise does by a ``gain``. Beside biases that may walk their drift is no other effect, and
-    others must explain more by more than chance: a walk looks like many."""
+    own, explains more than noise does by a ``gain``. Beside biases that may walk it must do so by more than chance: a
+    walk looks like many."""
     c = fitted.c[fitted.free]
     far = np.abs(c) > LIMITS.far_from_prior * fitted.prior
     wider = fitted.chain._replace(prior=np.where(far, 1e-4, 1.0) * fitted.chain.prior)
     by_prior = solved(fitted.chain, fitted.prior).squares - solved(wider, fitted.prior).squares
-    others = (each for each in tested if not (walks and each.candidate.code == DRIFT))
-    better = (each.drop > (gain + each.limit if walks else max(gain, each.limit)) for each in others)
+    better = (each.drop > (gain + each.limit if walks else max(gain, each.limit)) for each in tested)
     return by_prior > gain or any(better)
 
 

@@ -1,4 +1,4 @@
-"""Effects outside the model that a recording shows: score tests of terms, of drifts, of the latitude.
+"""Effects outside the model: how far a recording speaks for terms that a study leaves out, and for another latitude.
 
 Each candidate adds columns to the last linear problem of a fit. Elimination of the nodes leaves normal equations of the
 coefficients alone, of which every candidate is a block: how far chi-square falls when it is freed, and how far the
@@ -15,7 +15,7 @@ before: where a recording shows that the drifts are smaller, they hardly count.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +30,8 @@ from inercal.foundation.units import STANDARD_GRAVITY
 from inercal.systems.strapdown.fit.arrow import forward
 from inercal.systems.strapdown.fit.batch import Fit
 from inercal.systems.strapdown.limits import LIMITS
-from inercal.systems.strapdown.model.coefficients import GROUPS, K0, LATITUDE, OPTIONS, D
-from inercal.systems.strapdown.settings import Noise, StrapdownSettings
+from inercal.systems.strapdown.model.coefficients import GROUPS, LATITUDE, OPTIONS
+from inercal.systems.strapdown.settings import StrapdownSettings
 
 _TERM = "g_sensitivity"
 
@@ -151,13 +151,6 @@ class TestedEffect(NamedTuple):
         return np.asarray(self.moved @ np.linalg.inv(np.linalg.cholesky(self.information)).T)
 
 
-DRIFT = "bias_drift"
-"""Code of biases that drift in proportion to time."""
-
-_RAMP = "_ramp"
-"""End of the name of such a drift, after that of the sensor."""
-
-
 def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
     """Effects that a fit may have left out."""
     G, prior = fit.sensitivities, settings.deviations()
@@ -175,26 +168,6 @@ def _candidates(fit: Fit, settings: StrapdownSettings) -> Iterator[Candidate]:
             G[:, :, [LATITUDE]],
             np.ones(1),
         )
-    middle = 0.5 * (fit.nodes.sample[1:] + fit.nodes.sample[:-1])
-    part = (middle - middle.mean()) / np.ptp(fit.nodes.sample)
-    noise = settings.noise
-    for sensor, walk, at in (("gyro", noise.gyro_walk, D), ("accelerometer", noise.accelerometer_walk, K0)):
-        if walk == 0.0:
-            yield _drift((sensor,), part[:, None, None] * G[:, :, at], prior[at])
-
-
-def _drift(sensors: tuple[str, ...], columns: Array, prior: Array) -> Candidate:
-    """Biases of the sensors that drift in proportion to time."""
-    whose = " and ".join(f"of the {each}s" for each in sensors)
-    walks = " and ".join(f"noise.{each}_walk" for each in sensors)
-    return Candidate(
-        f"{'_and_'.join(sensors)}{_RAMP}",
-        DRIFT,
-        f"biases {whose} that drift over the recording",
-        f"let the unit warm up, or state {walks}",
-        columns,
-        prior,
-    )
 
 
 class Posed(NamedTuple):
@@ -208,13 +181,12 @@ class Posed(NamedTuple):
     g: Array
     prior: Array
 
-    def tested(self, candidate: Candidate, *numbers: int, beside: int | None = None) -> TestedEffect | None:
-        """The score test of a candidate whose parameters are those of these ``numbers``, with those of another one
-        freed before it where ``beside`` is given; None where the information was lost in rounding."""
+    def tested(self, number: int) -> TestedEffect | None:
+        """The score test of a candidate; None where the information was lost in rounding."""
         from scipy.special import chdtri
 
-        p, q = len(self.prior), np.concatenate([self.places[each] for each in numbers])
-        free = np.arange(p) if beside is None else np.append(np.arange(p), self.places[beside])
+        p, q = len(self.prior), self.places[number]
+        free = np.arange(p)
         by = np.asarray(np.linalg.solve(self.H[np.ix_(free, free)], self.H[np.ix_(free, q)]), dtype=float)
         score = self.g[q] - by.T @ self.g[free]
         information = self.H[np.ix_(q, q)] - self.H[np.ix_(q, free)] @ by
@@ -223,7 +195,7 @@ class Posed(NamedTuple):
         drop = float(score @ np.linalg.solve(information, score))
         limit = float(chdtri(len(q), LIMITS.naming_risk / len(self.candidates)))
         moved = -self.prior[:, None] * by[:p]
-        return TestedEffect(candidate, drop, limit, moved, score, information)
+        return TestedEffect(self.candidates[number], drop, limit, moved, score, information)
 
 
 def posed(fit: Fit, settings: StrapdownSettings) -> Posed:
@@ -263,50 +235,5 @@ def eliminated(fit: Fit, columns: Array, information: Array) -> tuple[Array, Arr
 def tests(problem: Posed) -> list[TestedEffect]:
     """Score tests of all that a fit may have left out, the largest fall of chi-square first; without those whose
     information was lost in rounding."""
-    done = (problem.tested(each, number) for number, each in enumerate(problem.candidates))
+    done = (problem.tested(number) for number in range(len(problem.candidates)))
     return sorted((each for each in done if each), key=lambda each: -each.drop)
-
-
-def drifts(problem: Posed, noise: Noise) -> list[TestedEffect]:
-    """Drifts of biases that a recording shows, of the sensors whose biases may walk by this noise (`told_apart`)."""
-    walking = {"gyro": noise.gyro_walk > 0.0, "accelerometer": noise.accelerometer_walk > 0.0}
-    sensors = {
-        number: each.name.removesuffix(_RAMP)
-        for number, each in enumerate(problem.candidates)
-        if each.code == DRIFT
-    }
-    return told_apart(problem, {number: each for number, each in sensors.items() if walking[each]})
-
-
-def told_apart(problem: Posed, sensors: Mapping[int, str]) -> list[TestedEffect]:
-    """Drifts that a recording shows, of candidates by their numbers, one or two of them.
-
-    Those of gyros and of accelerometers look alike in part. Where each explains, beside the other, more than chance
-    does, they are one effect of both. Else the one without which the other leaves more than chance is shown; where
-    neither is needed beside the other, each that explains more than chance, in the words of both, for either may be it.
-    """
-    alone = {k: found for k in sensors if (found := problem.tested(problem.candidates[k], k)) is not None}
-
-    def needed(one: int, other: int) -> bool:
-        found = problem.tested(problem.candidates[one], one, beside=other)
-        return found is not None and found.significant
-
-    if len(alone) == 2:
-        weaker, stronger = sorted(alone, key=lambda k: alone[k].drop)
-        if needed(weaker, stronger):  # and so the stronger one is
-            first, second = (problem.candidates[k] for k in (stronger, weaker))
-            columns = np.concatenate([first.columns, second.columns], axis=2)
-            prior = np.concatenate([first.prior, second.prior])
-            effect = _drift((sensors[stronger], sensors[weaker]), columns, prior)
-            both = problem.tested(effect, stronger, weaker)
-            return [both] if both else []
-        if needed(stronger, weaker):
-            del alone[weaker]
-    shown = sorted((each for each in alone.values() if each.significant), key=lambda each: -each.drop)
-    if len(shown) < 2:
-        return shown
-    one, other = (each.candidate.words for each in shown)
-    return [
-        each._replace(candidate=each.candidate._replace(words=words))
-        for each, words in zip(shown, (f"{one}, or {other}", f"{other}, or {one}"), strict=True)
-    ]

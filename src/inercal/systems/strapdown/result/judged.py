@@ -6,7 +6,9 @@ Columns of what is asked are those of coefficients in each interval between node
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +47,9 @@ _FAMILIES = {
 """Groups of coefficients that are always fitted, in words."""
 
 _DIAGONAL = (0, 4, 8)
+
+_DRIFTS = "bias_drift"
+"""Code of biases that drift."""
 
 _WALKING = ("drift", "bend", "sway")
 """Verbs of biases that walk."""
@@ -89,23 +94,47 @@ def judged_unit(
     yield from blind(found, u, of_fit, pairs)
 
 
+def drifting(
+    still: Fit,
+    samples: Samples,
+    settings: StrapdownSettings,
+    found: tuple[str, ...],
+    slope: Array,
+    u: Array,
+) -> Iterator[Finding]:
+    """Findings about biases that drift, of the fit ``still`` in which they do not walk: a drift in proportion to time
+    looks like a walk, and is said where it harms a value. Arguments as of `judged_unit`."""
+    steady = replace(settings, noise=replace(settings.noise, gyro_walk=0.0, accelerometer_walk=0.0))
+    try:
+        of_fit, table = evidence_of_unit(still, samples, steady, slope, _DRIFTS)
+    except np.linalg.LinAlgError:
+        return
+    yield from (finding for finding in answers(found, u, of_fit, asked_of(of_fit, table)) if finding.harm)
+
+
 def evidence_of_unit(
-    fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Array
+    fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Array, code: str = ""
 ) -> tuple[FitEvidence, list[Question]]:
-    """The evidence of a fit and all that is asked of it; noise counts as known but for a factor.
+    """The evidence of a fit and all that is asked of it, or what has a ``code``; noise is known but for a factor from 1.
 
     Raises LinAlgError where rounding leaves nothing of the information.
     """
-    table = list(_questions(fit, samples, settings))
+    table = [question for question in _questions(fit, samples, settings) if not code or question.code == code]
     columns = np.concatenate([question.columns for question in table], axis=2)
     H, g = eliminated(fit, columns, np.zeros(columns.shape[2]))
-    of_fit, made = of_normal_equations(H, g, slope, fit.chi2, fit.dof, 0.0)
+    of_fit, made = of_normal_equations(H, g, slope, fit.chi2, fit.dof, _noise_dof(fit))
     ends = np.cumsum([question.columns.shape[2] for question in table])
     parts = np.split(made, ends[:-1], axis=1)
     return of_fit, [
         Question(q.cell, q.what, q.plural, q.verb, q.rest, part, q.code, q.action)
         for q, part in zip(table, parts, strict=True)
     ]
+
+
+def _noise_dof(fit: Fit) -> float:
+    """0 where residuals tell the size of the noise; inf where they are below what is stated: one noise of several is
+    stated too large then, and the others are what they are."""
+    return math.inf if fit.chi2 < fit.dof else 0.0
 
 
 def _questions(fit: Fit, samples: Samples, settings: StrapdownSettings) -> Iterator[Question]:
@@ -169,6 +198,13 @@ def _by_order(fit: Fit, settings: StrapdownSettings) -> Iterator[Question]:
     T = [KG.start + k for k in range(9)]
     turned = np.stack([G[:, :, T[i]] - G[:, :, T[j]] for i, j in ((5, 7), (6, 2), (1, 3))], axis=2)
     subjects.append(("frame", "the frame of the gyros", False, turned))
+    if not any(walking.values()):
+        both = np.concatenate([G[:, :, list(GROUPS[group])] for group in walking], axis=2)
+        together = _shaped(both, over_time(middle.astype(float))[0][2])
+        yield Question(
+            "order", "the biases of gyros and of accelerometers", True, "drift", "over the record", together,
+            _DRIFTS, "Let the unit warm up, or state noise.gyro_walk and noise.accelerometer_walk.",
+        )  # fmt: skip
     for group, what, plural, columns in subjects:
         drift = walking.get(group) is False
         walk = "gyro_walk" if group == "gyro_bias" else "accelerometer_walk"
@@ -178,7 +214,7 @@ def _by_order(fit: Fit, settings: StrapdownSettings) -> Iterator[Question]:
             named = drift and verb == "drift"
             yield Question(
                 "order", what, plural, verb, rest, _shaped(columns, shape),
-                "bias_drift" if named else "", f"Let the unit warm up, or state noise.{walk}." if named else "",
+                _DRIFTS if named else "", f"Let the unit warm up, or state noise.{walk}." if named else "",
             )  # fmt: skip
 
 

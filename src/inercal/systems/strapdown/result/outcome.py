@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -40,7 +40,7 @@ from inercal.systems.strapdown.model.coefficients import (
 )
 from inercal.systems.strapdown.model.samples import Samples, freed
 from inercal.systems.strapdown.result.budget import excess, sources
-from inercal.systems.strapdown.result.judged import judged_unit
+from inercal.systems.strapdown.result.judged import drifting, judged_unit
 from inercal.systems.strapdown.settings import TURN_NOISE, StrapdownSettings
 
 COMMAND = "calibrate strapdown"
@@ -74,12 +74,12 @@ def assemble(
     rests: tuple[Dwell, ...],
     fit: Fit,
     settings: StrapdownSettings,
-    ramps: Sequence[TestedEffect] = (),
+    still: Fit | None = None,
     by_filter: Filtered | None = None,
 ) -> Estimate:
     """Put the estimate together; of the filter, where there is one, in the place of the batch's coefficients: the
-    residuals of turns and the budget stay those of the batch. ``ramps`` are the drifts of biases that the recording
-    shows where these do not walk."""
+    residuals of turns and the budget stay those of the batch. ``still`` is the fit whose biases do not walk, where
+    those of ``fit`` were found to."""
     batch = fit
     if by_filter is not None:
         fit = replace(fit, c=by_filter.c, passes=by_filter.passes, converged=by_filter.converged)
@@ -116,13 +116,15 @@ def assemble(
     misfit = excess(fit)
     findings += _left_out(tested, found, J, fitted_u)
     if fit.converged and fit.chi2 > INFERENCE.noiseless**2 * fit.dof:
-        findings += judged_unit(batch, samples, settings, found, J, fitted_u)
+        said = list(judged_unit(batch, samples, settings, found, J, fitted_u))
+        if still is not None and not any(finding.code != "blind" for finding in said):
+            said = [*drifting(still, samples, settings, found, J, fitted_u), *said]
+        findings += said
     if 1.0 < misfit <= INFERENCE.gross:
         text = f"Residuals are {misfit:.2g} times what the stated noise explains, and u allows for it."
         findings.append(
             Finding("excess_scatter", text, harm=(), action="State the noise as it is under [noise].")
         )
-    findings += [each for ramp in ramps if (each := _shown(ramp, found, J, fitted_u)).harm]
     findings += [drifts.finding] if drifts and drifts.finding else []
     off = values - in_words(np.zeros(len(fit.free)))
     findings += beyond_prior(found, off, by_fit, misfit * prior_u, INFERENCE.value_risk)
@@ -345,16 +347,6 @@ def _left_out(tested: list[TestedEffect], found: tuple[str, ...], slope: Array, 
         if effect.candidate.name in USUAL
         and (harm := _beyond(found, np.linalg.norm(slope @ effect.reach, axis=1), u))
     ]
-
-
-def _shown(best: TestedEffect, found: tuple[str, ...], slope: Array, u: Array) -> Finding:
-    """The finding of an effect that the recording shows; it harms the values that it would shift by more than 2 u."""
-    candidate, harm = best.candidate, _beyond(found, np.abs(slope @ best.shift), INFERENCE.harm * u)
-    text = (
-        f"the recording shows {candidate.words} (chi-square falls by {best.drop:.4g} for "
-        f"{counted(len(candidate.prior), 'parameter')})"
-    )
-    return Finding(candidate.code, text, harm=harm, action=candidate.advice)
 
 
 def _beyond(found: tuple[str, ...], shift: Array, u: Array) -> tuple[str, ...]:

@@ -11,11 +11,15 @@ from inercal.foundation.arrays import Array
 from inercal.foundation.designs.foresight import Foresight, Lever
 from inercal.foundation.errors import StudyError
 from inercal.foundation.instruments.terms import shown_unit
+from inercal.foundation.results.budget import combine
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.model import channels_of
+from inercal.systems.turntable.model import TableModel, channels_of
 from inercal.systems.turntable.positions.fit import choose_terms, stated_noise
-from inercal.systems.turntable.positions.outcome import unit_of_term
+from inercal.systems.turntable.positions.judged import planned_blindness
+from inercal.systems.turntable.positions.outcome import sources, terms_of, unit_of_term
+from inercal.systems.turntable.positions.planning import expected_coefficients, samples_of
 from inercal.systems.turntable.positions.tolerance_design import trial
+from inercal.systems.turntable.regression import fit
 from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 
 
@@ -50,7 +54,17 @@ def foresight(settings: TurntableSettings) -> Foresight:
         text, size = shown_unit("m" if error.is_offset else "rad")
         std = error.distribution.std / size
         levers.append(Lever(f"rig.errors.{error.name}", std, text, error.what, '{ normal = "{}" }'))
-    return Foresight(names, units, sizes, tuple(levers), u)
+    return Foresight(names, units, sizes, tuple(levers), u, _blind(settings, used))
+
+
+def _blind(settings: TurntableSettings, used: TableModel) -> dict[str, float]:
+    """Share of faults that the positions hide, in their order, by `planned_blindness`."""
+    angles, c = _angles(settings), expected_coefficients(settings, used)
+    noise, samples = [settings.instrument.noise] * len(used.channels), samples_of(settings, angles)
+    found = fit(used, angles, used.outputs(angles, c), noise, start=c, samples=samples)
+    terms = terms_of(found)
+    u = combine(used.symbols, sources(found, terms, settings.instrument.unit.si)).u
+    return planned_blindness(found, terms.slope, u, terms.values)
 
 
 def verticals(settings: TurntableSettings) -> Array:

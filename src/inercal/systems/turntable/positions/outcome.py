@@ -75,7 +75,7 @@ class Terms:
     slope: Array
 
 
-def _terms_of(fit: Regression) -> Terms:
+def terms_of(fit: Regression) -> Terms:
     """Values of the terms of all channels."""
     values, slope = np.zeros(len(fit.c)), np.zeros((len(fit.c), len(fit.c)))
     for channel, block in zip(fit.model.channels, fit.model.blocks, strict=True):
@@ -147,7 +147,7 @@ def assemble(record: Record, readings: Readings, fitting: Fitting, settings: Tur
         return nothing(*_without_fit(readings, fitting, settings))
     fit, drift = fitting.fit, fitting.drift
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        terms = _terms_of(fit)
+        terms = terms_of(fit)
         finite = np.isfinite(np.square(terms.values)) & np.isfinite(np.square(terms.slope)).all(axis=1)
     if not finite.all():
         return nothing(Status.UNOBSERVABLE, _dead(fit, finite))

@@ -26,13 +26,16 @@ from inercal.foundation.designs.exchange import exchange
 from inercal.foundation.designs.search import Designed
 from inercal.foundation.errors import StudyError
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.questions import CELLS
+from inercal.foundation.results.budget import combine
 from inercal.foundation.rigs.outputs import table_outputs
 from inercal.foundation.rigs.plans import Plan, named, within
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
 from inercal.systems.turntable.model import TableModel, channels_of, orthonormal, stated_values, table_model
 from inercal.systems.turntable.positions.fit import choose_terms, earth_rate_of, rate_terms, stated_noise
-from inercal.systems.turntable.positions.outcome import unit_of_term
+from inercal.systems.turntable.positions.judged import planned_blindness
+from inercal.systems.turntable.positions.outcome import sources, terms_of, unit_of_term
 from inercal.systems.turntable.positions.tolerance import drift_shares, sphere_rows
 from inercal.systems.turntable.regression import fit, full_inputs, identify_channels, worst_rank
 from inercal.systems.turntable.settings import TurntableSettings
@@ -50,7 +53,8 @@ class JudgedPlan:
     """A plan and its figures of merit.
 
     ``figures`` with rank and null vectors of one channel; ``terms`` of it; ``model`` with the terms that ``figures.u``
-    is of; ``drift_shares`` of the table's errors, as in `inercal.systems.turntable.positions.tolerance.drift_shares`.
+    is of; ``drift_shares`` of the table's errors, as in `inercal.systems.turntable.positions.tolerance.drift_shares`;
+    ``blind``: the share of the faults by order, place, reading and history that would shift a value by 2 u unseen.
     """
 
     plan: Plan
@@ -58,6 +62,7 @@ class JudgedPlan:
     terms: int
     model: TableModel
     drift_shares: Mapping[str, float]
+    blind: Mapping[str, float]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -174,10 +179,15 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
     c, (rank, terms) = expected_coefficients(settings, used), worst_rank(whole)
     figures = _figures(plan, settings, used)
     shares: Mapping[str, float] = {}
+    hides: Mapping[str, float] = {}
     if not any(each.words for each in seen):
         noise, samples = [settings.instrument.noise] * len(channels), samples_of(settings, plan.angles)
         y = used.outputs(plan.angles, c)
-        shares = drift_shares(fit(used, plan.angles, y, noise, start=c, samples=samples))
+        found = fit(used, plan.angles, y, noise, start=c, samples=samples)
+        shares = drift_shares(found)
+        of_found = terms_of(found)
+        u = combine(used.symbols, sources(found, of_found, settings.instrument.unit.si)).u
+        hides = planned_blindness(found, of_found.slope, u, of_found.values)
     return JudgedPlan(
         plan,
         replace(
@@ -188,6 +198,7 @@ def _judged(plan: Plan, settings: TurntableSettings, model: TableModel) -> Judge
         terms,
         used,
         shares,
+        hides,
     )
 
 
@@ -295,6 +306,7 @@ def _entry(judged: JudgedPlan) -> dict[str, Any]:
         "rms_prediction": figures.rms_prediction,
         "predicted": dict(zip(judged.names, figures.u.tolist(), strict=True)),
         "drift_shares": dict(judged.drift_shares),
+        "blind": dict(judged.blind),
     }
 
 
@@ -314,6 +326,11 @@ def _comparison(designed: DesignedPositions) -> list[str]:
             f"{each.plan.name:<{wide}}  {len(each.plan):9d}  {rank:>7}  {condition}  {figures.d_efficiency:12.4f}  "
             f"{each.earth_rate:>10}  {rms}"
         )
+    lines += ["", "faults that would shift a value by 2 u unseen, by:"]
+    lines.append(f"{'plan':<{wide}}  {'order':>8}  {'place':>8}  {'reading':>8}  {'history':>8}")
+    for plan in designed.compare:
+        hides = (f"{100.0 * plan.blind[cell]:6.0f} %" if cell in plan.blind else "–" for cell in CELLS)
+        lines.append(f"{plan.plan.name:<{wide}}  " + "  ".join(f"{text:>8}" for text in hides))
     if len({each.earth_rate for each in designed.compare}) > 1:
         lines.append(
             "where the earth rate is stated, its terms are taken as known: fewer coefficients to share the readings"

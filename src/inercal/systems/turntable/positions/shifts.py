@@ -9,7 +9,7 @@ With f(L) a value as fitted at latitude L and f1, f2, f3 its derivatives, ``bend
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,12 +17,11 @@ import numpy as np
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
 from inercal.foundation.geometry.earth import EARTH_RATE, Site
-from inercal.foundation.records.places import counted
 from inercal.foundation.results.budget import TypeB
 from inercal.foundation.rigs.outputs import rate_reference
 from inercal.foundation.units import Unit
 from inercal.systems.turntable.limits import LIMITS
-from inercal.systems.turntable.positions.examination import Examination, Seen, TestedFault
+from inercal.systems.turntable.positions.examination import Examination, TestedFault
 from inercal.systems.turntable.regression import Regression, solve
 
 _NEAREST = float(np.radians(1.0))
@@ -106,9 +105,6 @@ def _refitted(fit: Regression, latitude: float) -> Array:
 _SHOWN = 4
 """Coefficients and faults named at most in a sentence."""
 
-_ROUNDING = 1e-9
-"""Part of what a fault does to the values below which a direction of it does nothing."""
-
 _DRIFTS = frozenset({"trend", "warm-up", "scale drift", "reading"})
 """Kinds of faults that are others in each run."""
 
@@ -140,7 +136,7 @@ class Scale:
 
 
 def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: Unit) -> Iterator[Finding]:
-    """Findings of significant faults, and of those that the test would not show."""
+    """Findings of significant faults."""
     shown = (unit.factor, unit.symbol)
     for each in examination.significant:
         shift = scale.shift(fit, each.fault.effect(each.values)[..., None])[:, 0]
@@ -151,56 +147,6 @@ def findings_of(examination: Examination, fit: Regression, scale: Scale, unit: U
             f"{each.chance:.1g}) shifts {_largest(scale.names, shift)}"
         )
         yield Finding(each.fault.code, text, "", harm, action=_REMEDY[each.fault.code])
-    worst: dict[str, Blind] = {}
-    for seen in examination.asked:
-        blind, kind = _blind(seen, fit, scale, shown), seen.fault.kind
-        if blind.shift > worst.get(kind, Blind(LIMITS.blind_shift)).shift:
-            worst[kind] = blind
-    if worst:
-        yield _weak(worst.values())
-
-
-@dataclass(frozen=True)
-class Blind:
-    """A fault that the residuals may miss: the largest ``shift`` of a value, over u, by one that is named in half of
-    the tests, infinite where none is; ``what`` it is, its ``size`` that shifts this ``value`` by 2 u."""
-
-    shift: float
-    what: str = ""
-    size: str = ""
-    value: str = ""
-
-
-def _blind(seen: Seen, fit: Regression, scale: Scale, shown: tuple[float, str]) -> Blind:
-    """The part of a fault that a test may miss: one that does not show, if it shifts any value, or else all of it."""
-    effect = scale.shift(fit, seen.fault.columns)
-    for base, reach in ((seen.hidden, np.inf), (seen.base, seen.reach)):
-        shift = effect @ base
-        size = np.linalg.norm(shift, axis=1)
-        worst = int(np.argmax(size))
-        if size[worst] > _ROUNDING * np.linalg.norm(effect):
-            values = base @ shift[worst] * 2.0 / size[worst] ** 2
-            told = seen.fault.size(values, shown)
-            return Blind(reach * float(size[worst]), seen.fault.what, told, scale.names[worst])
-    return Blind(0.0)
-
-
-def _weak(blind: Collection[Blind]) -> Finding:
-    """``weak_test``: faults that would shift a value by 2 u, and hardly show, or not at all."""
-    return Finding(
-        "weak_test",
-        f"This test cannot rule out {counted(len(blind), 'fault')} that would shift a value by 2 u.",
-        action="Shuffle the positions, take more of them, or repeat the first ones at the end.",
-        items=tuple(
-            {
-                "fault": each.what.rstrip(","),
-                "size that shifts the value by 2 u": each.size,
-                "value": each.value,
-                "residuals": "might not show it" if np.isfinite(each.shift) else "cannot show it",
-            }
-            for each in blind
-        ),
-    )
 
 
 def _hidden(tested: TestedFault, fit: Regression, scale: Scale) -> Array:
