@@ -32,9 +32,6 @@ from inercal.systems.aoa.settings import AoaSettings
 
 ANGLE = "theta"
 
-_SLOW = 5
-"""Groups, a tenth of a second, over which vibration of low frequency shows."""
-
 _LOOK: Final = {
     "order": "Look for warm-up, a loose mount, or a supply that changed.",
     "place": "Look for a cable that pulls, a sting that bends, or an axis of a sensor that is not as stated.",
@@ -52,7 +49,7 @@ class AnglePass:
     ``ends`` (p, m) what it does to the coefficients ``names`` at the end, over their u. ``by_constants`` (p, p)
     products of the covariances of theta with the coefficients, mean after the settling time; ``by_gravity`` (1 + p,)
     change of theta, rms, and of the coefficients with gravity [m/s^2]. ``faded``: constants faded on the way.
-    ``slow`` (N + 1,) squares of innovations summed over `_SLOW` groups, of each sensor, and ``slow_count``, their
+    ``slow`` (N + 1,) squares of innovations summed over a tenth of a second, of each sensor, and ``slow_count``, their
     number.
     """
 
@@ -113,7 +110,11 @@ def pass_of(
     squares, count, across = 0.0, 0, np.zeros(m)
     products, of_angle, settled = np.zeros((m, m)), np.zeros((m, m)), 0
     by_constants, lean = np.zeros((len(at), len(at))), 0.0
-    slow, slow_count = np.zeros(channels), 0
+    slow, slow_count, long = (
+        np.zeros(channels),
+        0,
+        5,
+    )  # groups: vibration of low frequency shows over a tenth of a second
     longest = max(head.rows.stop - head.rows.start for head in trace.heads)
     memory = loop.memory(longest, n, len(problem.places.moving), problem.count)
     out, dt = np.empty((longest, loop.OUTPUTS + channels)), np.diff(t, prepend=t[:1])
@@ -143,8 +144,8 @@ def pass_of(
             root = np.sqrt(np.maximum(seen, 1.0))
             begun = k[first] >= start + LIMITS.starting_rows
             of_groups = (z / root)[begun]
-            whole = of_groups[: len(of_groups) // _SLOW * _SLOW].reshape(-1, _SLOW, channels).sum(axis=1)
-            slow += np.sum(np.square(whole), axis=0) / _SLOW
+            whole = of_groups[: len(of_groups) // long * long].reshape(-1, long, channels).sum(axis=1)
+            slow += np.sum(np.square(whole), axis=0) / long
             slow_count += len(whole)
             white = of_groups.ravel()
             columns = (X / root[:, :, None])[begun].reshape(-1, m).astype(np.float32)

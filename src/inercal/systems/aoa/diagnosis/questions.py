@@ -153,7 +153,8 @@ class CourseMaker:
         y, size = of.y / within.size, np.abs(of.y) / within.size
         if self.lagging is None:
             self.lagging = np.stack([y[:, 0], y[:, 0], y[:, 0] ** 2, y[:, 0] ** 2])
-        lagging = [_following(load, dt / lag, self.lagging[k]) for k, (load, lag) in enumerate(_loads(y))]
+        loads = [(load, lag) for load in (y, y**2) for lag in _LAGS]
+        lagging = [_following(load, dt / lag, self.lagging[k]) for k, (load, lag) in enumerate(loads)]
         self.lagging = np.stack([followed[:, -1] for followed in lagging])
         moving = np.abs(of.change) > OF_JUDGE.near_zero * within.change
         made = np.stack(
@@ -176,11 +177,6 @@ class CourseMaker:
             ]
         )
         return np.asarray(within.wide * made)
-
-
-def _loads(y: Array) -> list[tuple[Array, float]]:
-    """Loads that are followed with a lag, and the lag [s]."""
-    return [(load, lag) for load in (y, y**2) for lag in _LAGS]
 
 
 def _following(x: Array, share: Array, start: Array) -> Array:
