@@ -296,10 +296,10 @@ def test_modules_can_be_read_in_one_go():
 
 #: what `tests/counts.py` counts; lowered when an issue is done
 CEILINGS = {
-    "names used across folders": 1506,
+    "names used across folders": 1502,
     "class names shared": 5,
-    "constants outside Limits": 448,
-    "modules": 661,
+    "constants outside Limits": 447,
+    "modules": 660,
 }
 
 
