@@ -87,7 +87,7 @@ def test_one_noise_that_is_stated_too_large_makes_no_fault_of_the_others():
     settings = replace(
         faults.SETTINGS, rests=replace(faults.SETTINGS.rests, velocity=3.0 * faults.TEST.vibration)
     )
-    estimate, _ = estimated(2, settings=settings)
+    estimate, _ = estimated(3, settings=settings)
     assert estimate.statistics["chi2"] < 0.6 * estimate.statistics["dof"]
     assert not [finding.code for finding in estimate.findings if finding.code in CELLS]
     assert estimate.status is Status.OK

@@ -115,7 +115,7 @@ def drifting(
 def evidence_of_unit(
     fit: Fit, samples: Samples, settings: StrapdownSettings, slope: Array, code: str = ""
 ) -> tuple[FitEvidence, list[Question]]:
-    """The evidence of a fit and all that is asked of it, or what has a ``code``; noise is known but for a factor from 1.
+    """The evidence of a fit and all that is asked of it, or what has a ``code``; noise counts as known, or as too low.
 
     Raises LinAlgError where rounding leaves nothing of the information.
     """
