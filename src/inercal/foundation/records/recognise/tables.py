@@ -255,7 +255,7 @@ def _recognised(
         for guess in guesses
         if guess.origin not in used
         and guess.name.partition("_")[0] not in found
-        and not said(titles[guess.origin]).never
+        and (guess.name.startswith("wc_") or not said(titles[guess.origin]).never)
     ]
     for triad in triads:
         for axis, index, unit in zip("xyz", triad.columns, triad.units, strict=True):
