@@ -53,7 +53,7 @@ def test_dimension_scales_are_the_clocks(tmp_path):
     np.testing.assert_array_equal(record["gyro_x"].t, T[::2])
     assert record.findings == ()
     assert len(record.sources) == 1
-    assert {unit.symbol for unit in canonical_units([path]).values()} == {"m/s^2", "deg/s"}
+    assert {unit.symbol for unit in canonical_units([path]).values()} == {"m/s^2", "deg/s", "s"}
 
 
 def test_the_map_guessed_for_two_clocks_reads_the_same_record(tmp_path):

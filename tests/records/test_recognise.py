@@ -227,8 +227,10 @@ def test_names_with_odd_characters_leave_a_map(tmp_path):
 @for_each("words", ["Cmd{} (deg/s)", "cmd_rate_{} [deg/s]", "Rate demand {} (deg/s)", "desired_w{} [deg/s]"])
 def test_a_commanded_rate_is_no_gyro(tmp_path, words):
     """A platform that is told how to turn; its command is the rate of a platform or nothing, never a gyro's output."""
-    head = ",".join(["Time (s)", *(words.format(axis) for axis in "XYZ"), *(f"Acc{axis} (m/s^2)" for axis in "XYZ")])
-    path = written(tmp_path / "log.csv", head, np.column_stack([T, np.degrees(GYRO), ACC]))
+    head = ",".join(
+        ["Time (s)", *(words.format(axis) for axis in "XYZ"), *(f"Acc{axis} (m/s^2)" for axis in "XYZ")]
+    )
+    path = written(tmp_path / "log.csv", head + "\n", np.column_stack([T, np.degrees(GYRO), ACC]))
     columns = tomllib.loads(guess_map(path))["columns"]
     assert {"acc_x", "acc_y", "acc_z"} <= columns.keys()
     assert not any(name.startswith("gyro") for name in columns)

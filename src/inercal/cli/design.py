@@ -52,11 +52,11 @@ def design_positions(
     from inercal.systems.turntable import verbs as system
 
     output.check(WHOLE if front else (*WHOLE, ".csv"), (study,))
+    place = place_of(workers, cluster)
     the_study, read_s = study_in("turntable", study, overrides, output)
     if front:
         with working(output) as progress:
             return give(system.design_front(the_study, progress), output, read_s, "front")
-    place = place_of(workers, cluster)
     with working(output) as progress:
         designed = system.design(the_study, progress, place)
 

@@ -55,7 +55,9 @@ OPTIONS_AGAIN: Mapping[str, Use] = {
         ),
         "value",
     ),
-    **dict.fromkeys(("--static", "--centrifugal", "--tangential", "--smooth", "--points"), "value"),
+    **dict.fromkeys(
+        ("--static", "--centrifugal", "--tangential", "--smooth", "--points", "--front"), "value"
+    ),
     **dict.fromkeys(("--seed", "--coefficient", "--until", "simulate selfcal --runs"), "value"),
     **dict.fromkeys(("--out", "--report"), "below"),
     **dict.fromkeys(("--json", "--quiet", "--keep", "--store", "--instrument"), "dropped"),

@@ -29,10 +29,11 @@ class ClockRates:
     def line(self) -> str:
         """The rates in words."""
         apart = abs(self.mean / self.median - 1.0) > LIMITS.mean_from_median
-        even = self.jitter * self.median < 1e-9  # rounding of the stamps
+        rounding = self.jitter * self.median < 1e-9
+        scatter = "steps are even" if rounding else f"steps scatter by {1e3 * self.jitter:.2g} ms"
         return (
             f"{self.clock}: {self.median:.5g} Hz by the median step, {self.mean:.5g} Hz by the mean"
-            f"{', which is another' if apart else ''}; {'steps are even' if even else f'steps scatter by {1e3 * self.jitter:.2g} ms'}"
+            f"{', which is another' if apart else ''}; {scatter}"
         )
 
 
@@ -80,18 +81,25 @@ class TurnsSeen:
                 f"gyro: shows {self.ratio:.3g} times the turns that the accelerometers see, at the rate typed"
             )
             found.append(
-                Finding("unit_suspect", text, action="check the sample rate, and the unit of the gyro")
+                Finding(
+                    "unit_suspect", text, harm=(), action="check the sample rate, and the unit of the gyro"
+                )
             )
         elif contradiction(self.ratio):
             text = f"gyro: shows {self.ratio:.3g} times the turns that the accelerometers see"
             found.append(
-                Finding("unit_suspect", text, action="check its unit, the full-scale range and the stamps")
+                Finding(
+                    "unit_suspect",
+                    text,
+                    harm=(),
+                    action="check its unit, the full-scale range and the stamps",
+                )
             )
         if words := turned_otherwise(self):
             text = f"gyro: its {words.removeprefix(', though its ')}"
             swapped = any(axis and abs(axis) != place for place, axis in enumerate(self.axes, 1))
             code = "channel_swap" if swapped else "sign_suspect"
-            found.append(Finding(code, text, action="check sign and order of the axes in the map"))
+            found.append(Finding(code, text, harm=(), action="check sign and order of the axes in the map"))
         return tuple(found)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections import Counter
 from pathlib import Path
@@ -58,10 +59,14 @@ def format_by_content(path: Path) -> str:
     return "text"
 
 
+_BEGINS_JSON = re.compile(rb"""\{\s*["}]|\[\s*(?:["\[{\]tfn]|-?\d[\d.eE+-]*\s*[,\]])""")
+"""A value of JSON, unlike a stamp in brackets."""
+
+
 def _is_one_document(head: bytes) -> bool:
     """True for a text that is one value of JSON, not a value each line; ``head`` are its first bytes."""
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if not text.startswith((b"{", b"[")):
+    if not _BEGINS_JSON.match(text):
         return False
     first, _, rest = text.partition(b"\n")
     try:
