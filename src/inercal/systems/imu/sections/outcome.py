@@ -46,7 +46,7 @@ from inercal.systems.imu.sections.shorthands import (
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.tables import (
-    budget_item,
+    budget_items,
     of_moves,
     of_poses,
     of_sections,
@@ -162,10 +162,14 @@ def of_proposal(
         basis = studied(COMMAND, settings, sources, MODEL, REFERENCES)
         none: Mapping[str, Any] = {"method": "sections", "sections": []}
         return CalibrationFromSections(
-            Estimate.without(basis, status, text, findings=findings, result=none), sections
+            Estimate.without(basis, status, text, findings=findings, result=none), sections, None, proposal
         )
 
-    if any(question.code != _OPEN for question in proposal.questions):
+    # that nothing rests is no question where a swing answers it
+    swung = set() if sections else {("not_at_rest", one.where) for one in proposal.swings}
+    asked = [one for one in proposal.questions if (one.code, one.where) not in swung]
+    proposal = replace(proposal, questions=tuple(asked))
+    if any(question.code != _OPEN for question in asked):
         return without(Status.INCONSISTENT, "")
     if not sections and proposal.swings:
         progress("fitting the swing")
@@ -337,8 +341,11 @@ def _estimate(
     sources = [source for record in records for source in record.sources]
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     budget = tuple(
-        budget_item(found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0})
+        item
         for source, shares in found.budget.items()
+        for item in budget_items(
+            found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0}
+        )
     )
     return Estimate.of(
         basis,
