@@ -30,9 +30,10 @@ class ClockRates:
         """The rates in words."""
         apart = abs(self.mean / self.median - 1.0) > LIMITS.mean_from_median
         even = self.jitter * self.median < 1e-9  # rounding of the stamps
+        steps = "steps are even" if even else f"steps scatter by {1e3 * self.jitter:.2g} ms"
         return (
             f"{self.clock}: {self.median:.5g} Hz by the median step, {self.mean:.5g} Hz by the mean"
-            f"{', which is another' if apart else ''}; {'steps are even' if even else f'steps scatter by {1e3 * self.jitter:.2g} ms'}"
+            f"{', which is another' if apart else ''}; {steps}"
         )
 
 

@@ -48,7 +48,10 @@ _TIME = (
     r"t|times?|time\w*|timestamp|stamps?|ts|secs?|elapsed|millis\w*|micros\w*|nsecs?|zeit\w*|laufzeit|temps|tiempo|"
     r"tempo|hora|heure|时间|epoch|clock|tow|seconds?|milliseconds|uhrzeit|datum|date|datetime"
 )
-_NEVER = r"bias\w*|drift|cov\w*|std|sd|sigma|var|variance|err\w*|status|clip\w*|setpoint|cmd|command\w*|demand\w*|desired|motor|debug|true|ideal|jerk"
+_NEVER = (
+    r"bias\w*|drift|cov\w*|std|sd|sigma|var|variance|err\w*|status|clip\w*|setpoint|cmd|command\w*|demand\w*|desired|"
+    r"motor|debug|true|ideal|jerk"
+)
 _SELDOM = r"user|free|gravity|offset|relative|ref|nominal|gt|truth|groundtruth|sim|clean"
 _HOW = (  # how the output of one device was treated
     r"raw|filt\w*|lp|smooth\w*|cal\w*|uncal\w*|corr\w*|comp\w*|meas\w*|noisy|data|sensor\w*|out\w*|val\w*|vec\w*|field|adc|"

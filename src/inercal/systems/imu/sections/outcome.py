@@ -165,11 +165,10 @@ def of_proposal(
             Estimate.without(basis, status, text, findings=findings, result=none), sections, None, proposal
         )
 
-    # that nothing rests is no question where a swing answers it
-    swung = set() if sections else {("not_at_rest", one.where) for one in proposal.swings}
-    asked = [one for one in proposal.questions if (one.code, one.where) not in swung]
-    proposal = replace(proposal, questions=tuple(asked))
-    if any(question.code != _OPEN for question in asked):
+    if proposal.swings and not sections:  # a swing answers that nothing rests
+        left = tuple(one for one in proposal.questions if one.code != "not_at_rest")
+        proposal = replace(proposal, questions=left)
+    if any(question.code != _OPEN for question in proposal.questions):
         return without(Status.INCONSISTENT, "")
     if not sections and proposal.swings:
         progress("fitting the swing")
