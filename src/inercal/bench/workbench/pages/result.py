@@ -95,7 +95,7 @@ def _verdict(bench: Bench, session: Session, result: Result) -> None:
 
 
 def _findings(bench: Bench, session: Session, result: Result) -> None:
-    """What was found, with its advice."""
+    """The findings, with their advice."""
     if not result.findings:
         return
     study = "" if session.study is None else read_bytes(session.study).decode(errors="replace")

@@ -354,7 +354,7 @@ def _estimate(
             for name in found.names
         ],
         found.x,
-        Uncertainty(found.covariance, found.dof, budget),
+        Uncertainty(found.covariance, found.dof, budget, found.common),
         _verdict(found, proposal, moves),
         findings=findings,
         statistics={
