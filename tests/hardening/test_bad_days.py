@@ -133,7 +133,8 @@ def test_a_bad_verdict_is_one_also_where_the_reader_left(tmp_path, capsys, monke
             raise BrokenPipeError
 
     monkeypatch.setattr("builtins.print", left)
-    assert run([*EXAMPLES["mpu6050"].command(str(FOLDER)).split()[1:], "--quiet"]) == 1
+    command = EXAMPLES["mpu6050"].command(str(FOLDER)).split()[1:]
+    assert run([*command, "--end", "60 s", "--quiet"]) == 1
 
 
 @pytest.mark.parametrize(

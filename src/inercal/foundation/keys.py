@@ -238,7 +238,6 @@ GONE: Mapping[tuple[str, str], str] = {
     ("imu.bias_drift", ""): "nothing: moves have the bias of the rests beside them, and a drift is named",
     ("budget", "turn angle"): "angles and rates",
     ("budget", "alignment"): "placing or axes",
-    ("budget", "time base"): "clock",
     ("budget", "horizontal earth rate"): "earth rate, level part",
     ("budget", "vertical earth rate"): "earth rate",
 }  # fmt: skip

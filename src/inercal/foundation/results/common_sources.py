@@ -17,6 +17,7 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.results.budget import BudgetItem
+from inercal.foundation.results.limits import LIMITS
 from inercal.foundation.results.result import Estimate
 
 _OF_THE_SITE = frozenset({"gravity", "gravity anomaly", "latitude", "height"})
@@ -38,8 +39,10 @@ class Taken:
         return np.sqrt(np.diag(self.covariance))
 
     def effect(self, item: BudgetItem) -> Array:
-        """(p,) size of what one u of a source does to the coefficients, with the sign of each coefficient."""
+        """(p,) size of what one u of a source does to the coefficients, with the sign of each coefficient; 0 where it
+        is too small to be felt."""
         share = np.array([float(item.share.get(name, 0.0)) for name in self.names])
+        share[share < LIMITS.felt_share] = 0.0
         return np.asarray(np.sqrt(share) * self.u * np.sign(self.values))
 
 
@@ -59,14 +62,18 @@ def common_sources(
         if item.type != "B" or item.source not in alike or twin is None:
             continue
         effects = a.effect(item), b.effect(twin)
-        if math.isclose(item.u, twin.u, rel_tol=1e-9) and _in_proportion(a.values, b.values, *effects):
+        if math.isclose(item.u, twin.u, rel_tol=1e-9) and _in_proportion(a, b, *effects):
             shared[item.source] = effects
     return shared
 
 
-def _in_proportion(a: Array, b: Array, by_a: Array, by_b: Array) -> bool:
-    """True if a source acts on the coefficients of both calibrations by the same fractions of their values."""
-    return bool(np.any(by_a)) and np.allclose(by_a * b, by_b * a, rtol=1e-3, atol=0.0)
+def _in_proportion(a: Taken, b: Taken, by_a: Array, by_b: Array) -> bool:
+    """True if a source acts on the coefficients of both calibrations by the same fractions of their values, as closely
+    as the rest of their variance lets anybody tell."""
+    off = np.abs((by_a * b.values) ** 2 - (by_b * a.values) ** 2)
+    rest = (a.u**2 - by_a**2) * b.values**2
+    near = 2.0 * LIMITS.proportion * (by_a * b.values) ** 2 + LIMITS.untold_share * np.maximum(rest, 0.0)
+    return bool(np.any(by_a) and np.all(off <= near))
 
 
 def _same_site(first: Estimate, second: Estimate) -> bool:

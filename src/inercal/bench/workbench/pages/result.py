@@ -57,6 +57,8 @@ def add(bench: Bench) -> None:
             place = ui.element("div").classes("" if job.report is None else "place-of-report")
             _coefficients(result)
             _budget(result)
+            if result.status is Status.OK:
+                _findings(bench, session, result)
             heading("Take it along")
             with ui.row():
                 for name, words in (("result.json", "Result (JSON)"), ("report.html", "Report (HTML)")):
@@ -82,12 +84,18 @@ _COLOURS = {Status.OK: "ok", Status.SUSPECT: "doubt"}
 
 
 def _verdict(bench: Bench, session: Session, result: Result) -> None:
-    """The verdict in its colour, and what was found, with its advice."""
+    """The verdict in its colour, and before all else what makes it other than ok."""
     ui.label(f"{result.status.value}: {result.message}").classes(
         "verdict " + _COLOURS.get(result.status, "bad")
     ).props('data-verdict="1"')
     if session.kind != STRAPDOWN.kind and _BY_TURNS in result.message:
         button(f"Begin again with {_BY_TURNS}", partial(_begin_again, bench, session))
+    if result.status is not Status.OK:
+        _findings(bench, session, result)
+
+
+def _findings(bench: Bench, session: Session, result: Result) -> None:
+    """The findings, with their advice."""
     if not result.findings:
         return
     study = "" if session.study is None else read_bytes(session.study).decode(errors="replace")

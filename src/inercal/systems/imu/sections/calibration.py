@@ -25,7 +25,7 @@ from inercal.systems.imu.sections.problem import Extra, Iterate, Problem, proble
 from inercal.systems.imu.sections.readings import Flags
 from inercal.systems.imu.sections.scatters import half_widths, nodes
 from inercal.systems.imu.sections.section import Section
-from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON
+from inercal.systems.imu.sections.unknowns import COEFFICIENTS, COMMON, MOUNTING
 
 
 @short_repr
@@ -45,6 +45,9 @@ class SectionCalibration:
     covariance: Array
     budget: dict[str, Array]
     """Shares (p,) of u^2 by their source."""
+    common: Array
+    """Part (p, p) of the covariance that is one error in repeat runs: by the site, the time base, and what was known
+    before of coefficients."""
     by_prior: tuple[str, ...]
     """Terms of which the data say less than what was known before."""
     leaning: tuple[str, ...]
@@ -236,6 +239,7 @@ def _result(fit: FittedSections, agreement: dict[str, float]) -> SectionCalibrat
         dof=dof,
         covariance=covariance * np.outer(scale, scale),
         budget=budget,
+        common=_common(linear, best, z, J),
         by_prior=tuple(np.array(names)[ruled].tolist()),
         leaning=tuple(np.array(names)[leaning].tolist()),
         scatter={name: float(np.exp(weights @ logs[:, k])) for k, name in enumerate(problem.sizes)},
@@ -264,6 +268,13 @@ def _result(fit: FittedSections, agreement: dict[str, float]) -> SectionCalibrat
         linear=linear,
         z=z,
     )
+
+
+def _common(linear: Linear, best: ArrowSolution, z: Array, J: Array) -> Array:
+    """Covariance (p, p) of the coefficients by errors that repeat runs of an instrument at a site share."""
+    again = linear.shared < MOUNTING.start  # an instrument is mounted anew
+    effects = (best.covariance[:, : len(J)] @ J.T / linear.sd(z)[: len(again), None])[again]
+    return np.asarray(effects.T @ effects)
 
 
 def _pulled_rates(problem: Problem, point: Iterate, linear: Linear, best: ArrowSolution) -> dict[str, float]:

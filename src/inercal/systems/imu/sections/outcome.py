@@ -46,7 +46,7 @@ from inercal.systems.imu.sections.shorthands import (
 )
 from inercal.systems.imu.sections.swung import calibrate_swing
 from inercal.systems.imu.sections.tables import (
-    budget_item,
+    budget_items,
     of_moves,
     of_poses,
     of_sections,
@@ -162,9 +162,12 @@ def of_proposal(
         basis = studied(COMMAND, settings, sources, MODEL, REFERENCES)
         none: Mapping[str, Any] = {"method": "sections", "sections": []}
         return CalibrationFromSections(
-            Estimate.without(basis, status, text, findings=findings, result=none), sections
+            Estimate.without(basis, status, text, findings=findings, result=none), sections, None, proposal
         )
 
+    if proposal.swings and not sections:  # a swing answers that nothing rests
+        left = tuple(one for one in proposal.questions if one.code != "not_at_rest")
+        proposal = replace(proposal, questions=left)
     if any(question.code != _OPEN for question in proposal.questions):
         return without(Status.INCONSISTENT, "")
     if not sections and proposal.swings:
@@ -337,8 +340,11 @@ def _estimate(
     sources = [source for record in records for source in record.sources]
     basis = studied(COMMAND, settings, sources, MODEL, REFERENCES, conditions)
     budget = tuple(
-        budget_item(found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0})
+        item
         for source, shares in found.budget.items()
+        for item in budget_items(
+            found, source, {n: float(s) for n, s in zip(found.names, shares, strict=True) if s > 0.0}
+        )
     )
     return Estimate.of(
         basis,
@@ -348,7 +354,7 @@ def _estimate(
             for name in found.names
         ],
         found.x,
-        Uncertainty(found.covariance, found.dof, budget),
+        Uncertainty(found.covariance, found.dof, budget, found.common),
         _verdict(found, proposal, moves),
         findings=findings,
         statistics={

@@ -30,8 +30,23 @@ def relative_alignment(found: SectionCalibration) -> list[Mapping[str, Any]]:
     ]
 
 
-def budget_item(found: SectionCalibration, source: str, share: Mapping[str, float]) -> BudgetItem:
-    """A line of the budget."""
+def budget_items(found: SectionCalibration, source: str, share: Mapping[str, float]) -> list[BudgetItem]:
+    """Lines of the budget by a source; gravity has one for each input of the site, such as its latitude."""
+    if source != "gravity":
+        return [_item(found, source, share)]
+    inputs = found.problem.priors.site.inputs
+    parts = {one: (one.u * one.sensitivity) ** 2 for one in inputs if one.u * one.sensitivity}
+    whole = sum(parts.values())
+    return [
+        BudgetItem(
+            one.source, "B", one.u, one.unit, {name: size * part / whole for name, size in share.items()}
+        )
+        for one, part in parts.items()
+    ]
+
+
+def _item(found: SectionCalibration, source: str, share: Mapping[str, float]) -> BudgetItem:
+    """The line of the budget by a source."""
     noise = {"noise of the accelerometers": ("acc", "m/s^2"), "noise of the gyro": ("gyro", "rad/s")}
     if source in noise:
         sensor, unit = noise[source]
@@ -42,7 +57,6 @@ def budget_item(found: SectionCalibration, source: str, share: Mapping[str, floa
     sds = [float(problem.sd[p]) for p in np.flatnonzero(problem.free) if problem.source(int(p)) == source]
     u = max((sd for sd in sds if math.isfinite(sd)), default=0.0)
     units = {
-        "gravity": "m/s^2",
         "earth rate": "rad/s",
         "earth rate, level part": "rad/s",
         "angles and rates": "rad/s",

@@ -46,7 +46,7 @@ MOUNTING: Final = slice(40, 43)
 COMMON: Final = 43
 """Number of the unknowns so far."""
 
-SOURCES: Final = ("gravity", "clock", "earth rate", "earth rate", "mounting", "mounting", "mounting")
+SOURCES: Final = ("gravity", "time base", "earth rate", "earth rate", "mounting", "mounting", "mounting")
 """Names in budgets of the errors that all sections share."""
 
 TILT, SWIVEL, RATE, EARTH = slice(0, 2), slice(2, 4), 4, slice(5, 8)
