@@ -18,13 +18,18 @@ from campaigns.places import add_options, in_words, place_of, progress
 
 from inercal.foundation.computing.runs import run
 from inercal.foundation.inference.consistency import coverage
-from inercal.foundation.instruments.terms import ACCELEROMETER_TRIAD, GYRO_G_SENSITIVITY, GYRO_TRIAD
-from inercal.systems.imu.aided.coefficients import circumstances_of, names_of
+from inercal.foundation.instruments.terms import (
+    ACCELEROMETER_TRIAD,
+    ACCELEROMETERS_IN_A_FRAME,
+    GYRO_G_SENSITIVITY,
+    GYRO_TRIAD,
+)
+from inercal.systems.imu.aided.coefficients import LEVER_ARMS
 from inercal.systems.imu.ferraris.names import TERMS_OF_FERRARIS
 
 SEED = 20261121
 METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")
-TRIADS = ("acc", "gyro")
+ON_A_TABLE = (*ACCELEROMETERS_IN_A_FRAME, *GYRO_TRIAD, *LEVER_ARMS, "tau_a", "tau_g")
 BY_HAND = ACCELEROMETER_TRIAD + GYRO_TRIAD
 OF_RATES = (*GYRO_TRIAD[:6], "T_xy", "T_xz", "T_yz")
 CAMPAIGNS = {
@@ -43,7 +48,7 @@ CAMPAIGNS = {
     ),
     "ferraris": (ferraris.one_calibration, TERMS_OF_FERRARIS),
     "ferraris, by scatter": (ferraris.one_calibration_by_scatter, TERMS_OF_FERRARIS),
-    "aided": (aided.one_calibration, (*names_of(TRIADS, False), *circumstances_of(TRIADS))),
+    "aided": (aided.one_calibration, ON_A_TABLE),
 }
 
 

@@ -40,7 +40,7 @@ def keys_of(kind: str) -> list[tuple[tuple[str, ...], object]]:
     """Every key of a template, those that are comments too: where it is, and the value shown there."""
     found, table = [], ()
     for line in TEXTS[kind].decode().splitlines():
-        if head := re.match(r"\[([\w.]+)\]", line):
+        if head := re.match(r"(?:# )?\[([\w.]+)\]", line):
             table = tuple(head[1].split("."))
         elif key := re.match(r"(?:# )?(\w+) = (?=\S)", line):
             try:

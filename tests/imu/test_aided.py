@@ -391,7 +391,7 @@ def test_pictures_of_sound_and_failed_calibrations(noisy):
         found = calibrate_aided(record, settings(), AidedSettings(CHAIN))
         drawn = pictures(found)
         fitted = found.fit is not None
-        assert drawn[fitted].title == "The table"
+        assert drawn[fitted].title == "The reference"
         assert len(drawn) == (4 + len(found.fit.identified) if fitted else 1)
         assert all(len(picture.svg) < 300_000 for picture in drawn)
         render(found.estimate, drawn, "Table")

@@ -10,7 +10,7 @@ from turned_units import DEG, SIDES, Bench, Unit
 from inercal.foundation.geometry.earth import GravityInput, Site
 from inercal.systems.imu.ferraris.calibration import calibrate_ferraris
 from inercal.systems.imu.sections.calibration import calibrate_sections
-from inercal.systems.imu.sections.outputs import misfit, rows
+from inercal.systems.imu.sections.outputs import centred, misfit, rows
 from inercal.systems.imu.sections.priors import Priors, Size
 from inercal.systems.imu.sections.problem import problem_of
 from inercal.systems.imu.sections.section import Section
@@ -197,3 +197,18 @@ def test_a_shipped_session_gives_what_its_authors_found(name):
     for term, other in found.result["imucal"].items():
         most = 0.6 if term.startswith("D_F") else 0.5
         assert abs(found[term].value - other) < most * found[term].u, term
+
+
+def test_level_axes_stay_where_a_vertical_moves_a_little():
+    """What is known along them would jump with them, and no step of the search near an upright pose would be better."""
+    unit = Unit(np.random.default_rng(5))
+    found = calibrate_sections(everything(unit), Priors(site_of(unit)))
+    free = int(np.flatnonzero(~found.problem.readings.know_up & ~found.problem.readings.tied)[0])
+    here = found.point.up.copy()
+    here[free] = [1e-7, 2e-7, 1.0]
+    before = centred(found.problem, replace(found.point, up=here))
+    here = before.up.copy()
+    here[free] = [2e-7, 1e-7, 1.0]
+    after = centred(found.problem, replace(before, up=here))
+    np.testing.assert_allclose(after.level, before.level, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.det(after.level), 1.0, atol=1e-12)

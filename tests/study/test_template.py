@@ -149,6 +149,7 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
         "level",
         "misalignment",
         "mounting",
+        "frame",
         "clock",
         "g_sensitivity",
     ):
@@ -165,14 +166,18 @@ def test_every_commented_key_loads_alone(kind, table, line, tmp_path):
     READ[kind](data, tmp_path / "t.toml")
 
 
-@pytest.mark.parametrize("method", ["ferraris", "aided"])
-def test_the_options_of_a_method_load(method, tmp_path):
-    """With the "# " taken from their tables."""
+@pytest.mark.parametrize(
+    ("method", "without"), [("ferraris", None), ("aided", "reference"), ("aided", "rig")]
+)
+def test_the_options_of_a_method_load(method, without, tmp_path):
+    """With the "# " taken from their tables, of two of which one stands in the place of the other."""
     text = filled("imu", overrides=[f"imu.method={method}"])
     begin = text.index(f"# [imu.{method}]")
     end = text.index("# [imu.aided]" if method == "ferraris" else "# [simulation]")
     text = text[:begin] + re.sub("(?m)^# ", "", text[begin:end]) + text[end:]
     data = tomllib.loads(text)
+    if without:
+        del data["imu"][method][without]
     Draft202012Validator(SCHEMA).validate(data)
     assert type(imu_study(data, "t.toml").method).__name__ == f"{method.title()}Settings"
 
@@ -227,7 +232,7 @@ def test_keys_of_the_instrument_can_be_stated():
 def test_the_instrument_is_that_of_the_record_with_examples_in_its_unit(channels):
     """Every example loads, alone and with all others; kind and unit are those of the channels."""
     text = filled("turntable", channels=channels)
-    table = text[text.index("[instrument]") : text.index("[design]")]
+    table = re.search(r"(?ms)^\[instrument\].*?(?=^(# )?\[design\])", text)[0]
     for line in table.splitlines():
         assert len(line) <= 110
         assert not line or re.fullmatch(r"\[[\w.]+\]  +# \S.*", line) or KEY.fullmatch(line), line

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from inercal.foundation.arrays import Array
+from inercal.systems.imu.sections.limits import LIMITS
 from inercal.systems.imu.sections.problem import Iterate, Problem, RowBlock
 from inercal.systems.imu.sections.unknowns import (
     CLOCK,
@@ -213,8 +214,18 @@ def centred(problem: Problem, point: Iterate) -> Iterate:
         gain = x[K1][:, None] * matrix(x[M])
         felt = (r.y[r.led, 0] - x[K0]) @ np.linalg.inv(gain).T
         up[r.led] = felt / np.linalg.norm(felt, axis=1, keepdims=True)
-    level = level_axes(up)
-    out = replace(point, x=x, up=up, axis=axis, level=level)
+    out = replace(point, x=x, up=up, axis=axis, level=_kept_level(point.level, up))
     for extra in problem.extras:
         out = extra.centred(problem, out)
     return out
+
+
+def _kept_level(before: Values, up: Array) -> Array:
+    """Level axes (n, 3, 3) about verticals ``up`` (n, 3) that lie as those ``before`` did: axes chosen anew would jump
+    where a vertical passes from the region of one choice to that of another, and what is known along them with it."""
+    first = before[:, :, 0]
+    first = first - up * np.sum(first * up, axis=1, keepdims=True)
+    size = np.linalg.norm(first, axis=1, keepdims=True)
+    first = first / np.maximum(size, LIMITS.level_axis)
+    kept = np.stack([first, cross(up, first), up], axis=2)
+    return np.where(size[:, :, None] > LIMITS.level_axis, kept, level_axes(up))
