@@ -246,8 +246,10 @@ def _without_say(
     other = [k for k in range(len(joint.names)) if k not in at]
     for mine, theirs in ((x, alone.x), (u, alone.u), (U, alone.U), (dof, alone.dof)):
         mine[at] = theirs[own]
-    C[np.ix_(at, at)] = alone.covariance[np.ix_(own, own)]
-    C[np.ix_(at, other)] = C[np.ix_(other, at)] = 0.0
+    common = joint.common.copy()
+    for mine, theirs in ((C, alone.covariance), (common, alone.common)):
+        mine[np.ix_(at, at)] = theirs[np.ix_(own, own)]
+        mine[np.ix_(at, other)] = mine[np.ix_(other, at)] = 0.0
     gyro = {name for k in other for name in [joint.names[k]]}
     return replace(
         joint,
@@ -256,6 +258,7 @@ def _without_say(
         U=U,
         dof=dof,
         covariance=C,
+        common=common,
         by_prior=(*alone.by_prior, *(name for name in joint.by_prior if name in gyro)),
         leaning=(*alone.leaning, *(name for name in joint.leaning if name in gyro)),
         residuals=np.concatenate([alone.residuals[:, :2], joint.residuals[:, 2:]], axis=1),
