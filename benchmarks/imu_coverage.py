@@ -31,16 +31,14 @@ SEED = 20261121
 METHODS = ("multiposition", "ferraris", "aided", "means", "known_rates", "known_turns")
 ON_A_TABLE = (*ACCELEROMETERS_IN_A_FRAME, *GYRO_TRIAD, *LEVER_ARMS, "tau_a", "tau_g")
 BY_HAND = ACCELEROMETER_TRIAD + GYRO_TRIAD
+WITH_SQUARES = (*ACCELEROMETER_TRIAD, "K2_x", "K2_y", "K2_z", *GYRO_TRIAD, *GYRO_G_SENSITIVITY)
 OF_RATES = (*GYRO_TRIAD[:6], "T_xy", "T_xz", "T_yz")
 CAMPAIGNS = {
     "means": (rows.one_of_means, ACCELEROMETER_TRIAD),
     "known_rates": (rows.one_of_known_rates, OF_RATES),
     "known_turns": (rows.one_of_known_turns, GYRO_TRIAD),
-    "multiposition, K2 drawn": (rows.one_with_k2, BY_HAND),
-    "multiposition, K2 fitted": (
-        rows.one_with_k2_fitted,
-        (*ACCELEROMETER_TRIAD, "K2_x", "K2_y", "K2_z", *GYRO_TRIAD),
-    ),
+    "multiposition, K2 drawn": (rows.one_with_k2, WITH_SQUARES),
+    "multiposition, K2 fitted": (rows.one_with_k2_fitted, WITH_SQUARES),
     "multiposition": (by_hand.one_calibration, BY_HAND),
     "multiposition, g-sensitivity": (
         by_hand.one_calibration_with_g_sensitivity,

@@ -44,7 +44,13 @@ def _one(rng: np.random.Generator, g_sensitivity: float) -> dict[str, Array]:
     clock = 1.0 + rng.normal(0.0, TIME_BASE_U)
     record, truth = simulate(truth, hand_poses(rng, 24), gravity, LATITUDE, rng, rate=50.0, clock=clock)
     site = Site(GRAVITY, (GravityInput("gravity", GRAVITY_U, "m/s^2", 1.0),), LATITUDE)
-    settings = ImuSettings(site, g_sensitivity=g_sensitivity > 0.0, time_base_u=TIME_BASE_U, k2_u=0.0)
+    settings = ImuSettings(
+        site,
+        g_sensitivity=g_sensitivity > 0.0,
+        g_sensitivity_u=None if g_sensitivity > 0.0 else 0.0,
+        time_base_u=TIME_BASE_U,
+        k2_u=0.0,
+    )
     estimate = calibrate_imu(record, settings).estimate
     true = truth.values()
     return {

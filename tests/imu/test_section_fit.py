@@ -212,3 +212,17 @@ def test_level_axes_stay_where_a_vertical_moves_a_little():
     after = centred(found.problem, replace(before, up=here))
     np.testing.assert_allclose(after.level, before.level, atol=1e-6)
     np.testing.assert_allclose(np.linalg.det(after.level), 1.0, atol=1e-12)
+
+
+def test_what_gravity_does_is_the_same_error_in_repeat_runs():
+    """As much as the values move with gravity as it is stated; what is read has no part in it."""
+    unit, u = Unit(np.random.default_rng(6)), 1e-3
+    sections, there = everything(unit), site_of(unit)
+    of_gravity = (GravityInput("gravity", u, "m/s^2", 1.0),)
+    known, stated = (calibrate_sections(sections, Priors(replace(there, inputs=i))) for i in ((), of_gravity))
+    moved = calibrate_sections(sections, Priors(replace(there, gravity=there.gravity + u, inputs=of_gravity)))
+    at = [stated.names.index(f"K1_{axis}") for axis in "xyz"]
+    shift = (moved.x - stated.x)[at]
+    by_gravity = (stated.common - known.common)[np.ix_(at, at)]
+    np.testing.assert_allclose(by_gravity, np.outer(shift, shift), rtol=0.05)
+    assert np.linalg.eigvalsh(stated.covariance - stated.common).min() > -1e-12

@@ -7,6 +7,7 @@ import pytest
 from moved_units import turned_by_hand
 from swung_units import hand
 
+import inercal as ic
 from inercal.cli import run
 
 STUDY = """schema = 1
@@ -77,3 +78,22 @@ def test_a_log_in_which_nothing_rests_is_a_swing(folder):
     (said,) = [one for one in found["findings"] if one["code"] == "not_at_rest"]
     assert "calibrated as a swing" in said["headline"]
     assert [row["kind"] for row in found["result"]["sections"]] == ["swing"]
+
+
+@pytest.mark.slow
+def test_the_search_ends_where_a_vertical_crosses_a_choice_of_level_axes():
+    """A gyro that feels earth rate: axes of its level part that jumped by a step of a vertical, however small, left the
+    search no step that lowers the sum of squares."""
+    study = ic.study(
+        "imu",
+        site={"gravity": "9.8100(5) m/s^2", "latitude": "50 deg"},
+        simulation={
+            "poses": 24,
+            "hold": "3 s",
+            "accelerometer_noise": "80 ug/sqrt(Hz)",
+            "gyro_noise": "0.3 deg/sqrt(h)",
+            "coefficients": {"K1_x": "4100 count/g"},
+        },
+    )
+    found = ic.calibrate(ic.simulate(study, np.random.default_rng(1)), study)
+    assert found.status.value == "ok", found.message
