@@ -26,11 +26,14 @@ from campaigns.rows import (
 )
 from recordings import shipped
 from scipy.optimize import least_squares
+from scipy.stats import binom
 
 import inercal as ic
 from inercal.foundation.errors import RecordError, StudyError
 from inercal.foundation.findings import Status
 from inercal.foundation.geometry.earth import EARTH_RATE
+from inercal.foundation.inference.limits import LIMITS
+from inercal.foundation.inference.questions import CELLS
 from inercal.foundation.instruments.terms import GYRO_TRIAD
 from inercal.systems.imu.figures import page, pictures
 from inercal.systems.imu.settings import (
@@ -314,6 +317,22 @@ def test_k2_beyond_what_was_stated_is_named():
     assert large.status is Status.SUSPECT
     (finding,) = [each for each in large.findings if each.code == "unmodelled_k2"]
     assert "K0_x" in finding.harm
+
+
+def test_k2_within_what_was_stated_is_hardly_ever_named():
+    """18 sound tables at the risk of all questions together, at 99.99 %."""
+    rng, stated = np.random.default_rng(24), 20e-6 / 9.80665
+    sound = [by_means(pose_means(rng, k2=stated * rng.normal(size=3))[1], k2_u=stated) for _ in range(18)]
+    named = sum("unmodelled_k2" in {each.code for each in one.findings} for one in sound)
+    assert named <= binom.ppf(0.9999, 18, LIMITS.question_risk)
+
+
+def test_sound_orientations_are_named_falsely_as_rarely_as_stated():
+    """9 sound tests, of what goes by order, place, reading or history, at the risk of all questions, at 99.99 %."""
+    rng = np.random.default_rng(15)
+    codes = {f"by_{cell}" for cell in CELLS}
+    named = sum(bool(codes & {each.code for each in by_rates(platter(rng)[1]).findings}) for _ in range(9))
+    assert named <= binom.ppf(0.9999, 9, LIMITS.question_risk)
 
 
 def test_the_alignment_that_nobody_states_is_in_u():

@@ -17,13 +17,14 @@ from inercal.foundation.findings import Finding
 from inercal.foundation.inference.limits import LIMITS
 from inercal.foundation.inference.scores import ErrorColumns, ErrorScore, PassSums
 
-_CODES: Final = {
+CODES: Final = {
     "order": "by_order",
     "place": "by_place",
     "reading": "by_reading",
     "history": "by_history",
     "rig": "unmodelled",
 }
+"""Cell of a question -> code of its finding."""
 
 Sized = Callable[[float], tuple[str, str, str]]
 """Code, sentence, without a full stop, and action of an error of one size."""
@@ -31,13 +32,11 @@ Sized = Callable[[float], tuple[str, str, str]]
 
 class PassQuestion(NamedTuple):
     """A question: the ``cell`` order, place, reading or history, or ``rig``; its ``sentence`` without a full stop; and
-    the ``columns`` of the pass. ``named``: a hypothesis of the system says the same with its value and its remedy;
-    ``sized``: the words that are better once its size is known."""
+    the ``columns`` of the pass; ``sized``: the words that are better once its size is known."""
 
     cell: str
     sentence: str
     columns: ErrorColumns
-    named: bool = False
     sized: Sized | None = None
 
 
@@ -119,20 +118,32 @@ def speaking(
     if first is None:
         return None
     question, score = first.answer
-    shift = shifts(first.answer)
-    worst = int(np.argmax(np.abs(shift)))
-    size = abs(float(shift[worst]))
-    least_words = "at least " if first.left else ""
-    moves = f"which shifts {names[worst]} by {least_words}{size:.2g} u"
-    if size < 0.1:
-        moves = "which shifts no value by more than 0.1 u"
-    items = [_item("shown", first.answer) | {"shift in u": float(shift[worst])}]
-    items += [_item("as likely", other) for other in first.others[:3]]
-    code, sentence, action = _CODES[question.cell], question.sentence, look[question.cell]
+    moved = moved_by(shifts(first.answer), names, at_least=bool(first.left))
+    items = [row_of("shown", question.cell, question.sentence, score) | {"shift in u": moved.worst}]
+    items += [row_of("as likely", *other.question[:2], other.score) for other in first.others[:3]]
+    code, sentence, action = CODES[question.cell], question.sentence, look[question.cell]
     if question.sized is not None and len(score.b) == 1:
         code, sentence, action = question.sized(float(score.b[0]))
+    return Finding(code, f"{sentence}, {moved.words}.", harm=moved.harm, action=action, items=tuple(items))
+
+
+class MovedValues(NamedTuple):
+    """Shift of values by an error: the largest in ``words``, itself, ``worst`` [u], and the values that it harms."""
+
+    words: str
+    worst: float
+    harm: tuple[str, ...]
+
+
+def moved_by(shift: Array, names: Sequence[str], at_least: bool) -> MovedValues:
+    """Shifts (v,) [u] of values by name; ``at_least`` where more is left than the error explains."""
+    k = int(np.argmax(np.abs(shift)))
+    size = abs(float(shift[k]))
+    words = f"which shifts {names[k]} by {'at least ' if at_least else ''}{size:.2g} u"
+    if size < 0.1:
+        words = "which shifts no value by more than 0.1 u"
     harm = tuple(name for name, by in zip(names, np.abs(shift), strict=True) if by > LIMITS.harm)
-    return Finding(code, f"{sentence}, {moves}.", harm=harm, action=action, items=tuple(items))
+    return MovedValues(words, float(shift[k]), harm)
 
 
 def blind_of(
@@ -156,7 +167,7 @@ def blind_of(
         {"unseen": question.sentence, "shifts": name, "by up to, in u": shift}
         for shift, name, question in unseen[:5]
     ]
-    for cell in _CODES:
+    for cell in CODES:
         asked_of = sum(question.cell == cell for question, _ in shown)
         if count := sum(question.cell == cell for *_, question in unseen):
             items.append({"unseen": f"by {cell}", "faults": float(count), "of": float(asked_of)})
@@ -168,7 +179,6 @@ def blind_of(
     )
 
 
-def _item(kind: str, answer: PassAnswer) -> dict[str, str | float]:
-    """A row of the finding's table."""
-    question, score = answer
-    return {"kind": kind, "by": question.cell, "what": question.sentence, "by chance": score.chance}
+def row_of(kind: str, cell: str, sentence: str, score: ErrorScore) -> dict[str, str | float]:
+    """A row of a finding's table: a question, and the chance that a sound record answers it so."""
+    return {"kind": kind, "by": cell, "what": sentence, "by chance": score.chance}

@@ -36,9 +36,6 @@ class Limits:
     outlier_dof: int = 3
     """Degrees of freedom that have to be left without the outliers."""
 
-    scatter_probability: float = 0.05
-    """Probability below which more scatter than the noise explains is not put down to chance."""
-
     ordinary_clock: float = 50e-6
     """Relative error that the clock of a recorder has as a rule."""
 
@@ -57,9 +54,6 @@ class Limits:
 
     same_pose: float = 5e-3
     """Change of specific force, as a part of gravity, below which a short disturbance leaves the pose the same."""
-
-    k2_probability: float = 5e-4
-    """Probability below which a part of the residuals that goes as K2 is not put down to chance."""
 
     clipped_part: float = 0.1
     """Part of the samples of a pose at the end of an accelerometer's range from which its mean counts as short."""
@@ -83,12 +77,6 @@ class Limits:
     """Size of a gyro's smoothed output, over that at rest (rms), from which it turns."""
 
     # Ferraris: sections
-
-    hold_variance: float = 8.0
-    """Variance of an output, over that of the calm parts, below which the instrument is held still."""
-
-    calm_quantile: float = 0.2
-    """Quantile of the windowed variance that stands for rest: holds are more than a fifth of a recording."""
 
     upright_cosine: float = 0.9
     """Cosine of the largest angle from upright (26 deg) in a hold that counts as a position."""
@@ -119,9 +107,6 @@ class Limits:
 
     lost_rate: float = 0.3
     """Rate at an end of a turn, as a part of its largest rate, from which the angle of the turn is not known at all."""
-
-    faint_response: float = 0.3
-    """Least part of an output's largest response that a position or a turn has to show on its axis."""
 
     # Ferraris: choice of the turns
 

@@ -13,19 +13,12 @@ import numpy as np
 
 from inercal.foundation.arrays import Array
 from inercal.foundation.findings import Finding
+from inercal.foundation.inference.asked_pass import CODES, moved_by, row_of
 from inercal.foundation.inference.limits import LIMITS as OF_JUDGE
 from inercal.foundation.inference.scores import ErrorScore, PassSums
 from inercal.systems.selfcal.diagnosis.catalogue import NamedCause
 from inercal.systems.selfcal.diagnosis.questions import PlatformQuestion
 from inercal.systems.selfcal.limits import LIMITS
-
-_CODES: Final = {
-    "order": "by_order",
-    "place": "by_place",
-    "reading": "by_reading",
-    "history": "by_history",
-    "rig": "unmodelled",
-}
 
 _LOOK: Final = {
     "order": "Look for warm-up, a loose mount or a changed supply; where biases wander name bias_walk under [model].",
@@ -122,22 +115,17 @@ def _speaking(
     )
     answer = alike[first]
     shift = answer.score.shift[: len(names)] / sums.u[: len(names)]
-    worst = int(np.argmax(np.abs(shift)))
-    size = abs(float(shift[worst]))
-    least = "at least " if counts[first] else ""
-    moves = f"which shifts {names[worst]} by {least}{size:.2g} u"
-    if size < 0.1:
-        moves = "which shifts no value by more than 0.1 u"
+    moved = moved_by(shift, names, at_least=bool(counts[first]))
     question = answer.question
-    cause = NamedCause(_CODES[question.cell], question.sentence, _LOOK[question.cell])
+    cause = NamedCause(CODES[question.cell], question.sentence, _LOOK[question.cell])
     if question.naming is not None:
         cause = question.naming(answer.score.b, answer.score.u)
     others = [hit for k, hit in enumerate(alike) if k != first][:3]
-    items = [*cause.items, _item("shown", answer) | {"shift in u": float(shift[worst])}]
-    items += [_item("as likely", hit) for hit in others]
-    harm = tuple(name for name, by in zip(names, np.abs(shift), strict=True) if by > OF_JUDGE.harm)
-    headline = f"{cause.sentence}, {moves}."
-    return answer, Finding(cause.code, headline, harm=harm, action=cause.action, items=tuple(items))
+    shown = row_of("shown", question.cell, question.sentence, answer.score) | {"shift in u": moved.worst}
+    items = [*cause.items, shown]
+    items += [row_of("as likely", *hit.question[:2], hit.score) for hit in others]
+    headline = f"{cause.sentence}, {moved.words}."
+    return answer, Finding(cause.code, headline, harm=moved.harm, action=cause.action, items=tuple(items))
 
 
 def settled(before: PassSums, said: Spoken, z: Array) -> bool:
@@ -162,9 +150,3 @@ def _as_likely(hits: Sequence[Answer]) -> list[Answer]:
     if hits[0].score.chance < 1e-300:  # beyond all doubt: by what they explain
         alike = [hit for hit in alike if hit.score.explained >= OF_JUDGE.as_likely * hits[0].score.explained]
     return alike[: OF_JUDGE.compared]
-
-
-def _item(kind: str, answer: Answer) -> dict[str, str | float]:
-    """A row of the finding's table."""
-    question, score = answer
-    return {"kind": kind, "by": question.cell, "what": question.sentence, "by chance": score.chance}

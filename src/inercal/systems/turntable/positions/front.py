@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inercal.foundation.arrays import Array
-from inercal.foundation.designs.criteria import insensitive
 from inercal.foundation.designs.tolerances import cheapest, total
 from inercal.foundation.errors import InputError, StudyError
 from inercal.foundation.findings import Finding
 from inercal.foundation.rigs.plans import Plan, within
 from inercal.systems.turntable.model import TableModel
-from inercal.systems.turntable.positions.planning import candidates_of, expected_model, largest_index
-from inercal.systems.turntable.positions.tolerance_design import searched, trial
+from inercal.systems.turntable.positions.planning import candidates_of, of_low_sensitivity
+from inercal.systems.turntable.positions.tolerance_design import model_with_tolerances, searched, trial
 from inercal.systems.turntable.settings import DRIFT, TurntableSettings
 
 _NUMBERS = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -74,21 +73,12 @@ def front(settings: TurntableSettings, progress: Callable[[str], None] = lambda 
     StudyError
         No noise or errors of the table are stated, or no number of positions identifies the coefficients.
     """
-    if settings.instrument.noise is None:
-        raise StudyError(
-            "instrument.noise", 'missing, expected the noise of one reading such as noise = "0.01 deg/h"'
-        )
-    if not settings.chain.errors:
-        raise StudyError(
-            "rig.errors", 'found none, expected present tolerances such as default = { uniform = "2 arcmin" }'
-        )
-    model, _, findings = expected_model(settings)
+    model, findings = model_with_tolerances(settings)
     points: list[FrontPoint] = []
     usual = math.nan
     numbers = sorted({max(len(model.symbols), round(part * settings.design.positions)) for part in _NUMBERS})
-    numbers.sort(
-        key=lambda number: number != settings.design.positions
-    )  # the study's own, whose u sets the levels
+    # the study's own first, whose u sets the levels
+    numbers.sort(key=lambda number: number != settings.design.positions)
     for constrained in (False, True) if settings.design.constraint is not None else (False,):
         for number in numbers:
             progress(f"{number} positions{', of low sensitivity' if constrained else ''}")
@@ -145,13 +135,11 @@ def _plan(settings: TurntableSettings, model: TableModel, number: int, constrain
 
 
 def _insensitive(settings: TurntableSettings, model: TableModel) -> NDArray[np.bool_]:
-    """Candidates (m,) that the constraint of the study leaves."""
-    constraint, angles = settings.design.constraint, settings.design.candidates.angles
-    assert constraint is not None
+    """Candidates (m,) that limits and constraint of the study leave."""
+    angles = settings.design.candidates.angles
     mask = within(angles, [settings.limits.get(joint) for joint in model.chain.joints])
     candidates = candidates_of(model, angles, np.zeros(len(model.symbols)), settings, False)
-    indices = np.where(mask, largest_index(settings), np.nan)
-    return np.asarray(mask & insensitive(candidates, indices, constraint.below, settings.design.positions))
+    return of_low_sensitivity(settings, candidates, mask)
 
 
 def _row(point: FrontPoint, settings: TurntableSettings) -> dict[str, Any]:

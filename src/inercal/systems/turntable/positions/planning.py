@@ -137,10 +137,7 @@ def design(
     criterion = _criterion(asked.criterion, model)
     if asked.constraint is not None:
         progress("computing the indices of the candidates")
-        indices = largest_index(settings)
-        allowed = mask & insensitive(
-            everywhere, np.where(mask, indices, np.nan), asked.constraint.below, asked.positions
-        )
+        allowed = of_low_sensitivity(settings, everywhere, mask)
         search(f"{searched}, S below {asked.constraint.below:g}", everywhere, criterion, allowed)
     search(searched, everywhere, criterion, mask)
     if asked.table_errors or asked.criterion != "D":
@@ -280,7 +277,18 @@ def _criterion(name: str, model: TableModel) -> Criterion:
     return i_criterion(sphere_rows(model))
 
 
-def largest_index(settings: TurntableSettings) -> Array:
+def of_low_sensitivity(
+    settings: TurntableSettings, candidates: Candidates, mask: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Candidates (m,) of the ``mask`` (m,) that the constraint of the study leaves; raises `InputError` where these are
+    too few."""
+    asked = settings.design
+    assert asked.constraint is not None
+    indices = np.where(mask, _largest_index(settings), np.nan)
+    return np.asarray(mask & insensitive(candidates, indices, asked.constraint.below, asked.positions))
+
+
+def _largest_index(settings: TurntableSettings) -> Array:
     """Largest first-order index (m,) of the constrained factors on the constrained outputs."""
     from inercal.foundation.sensitivities import exact
 

@@ -162,12 +162,7 @@ def design_tolerances(
     goal, prices = settings.tolerances.goal, settings.tolerances.prices
     if not goal:
         raise StudyError("goal", 'missing, expected wanted uncertainties such as DX_F = "0.01 deg/h"')
-    stated_noise(settings)
-    if not settings.chain.errors:
-        raise StudyError(
-            "rig.errors", 'found none, expected present tolerances such as default = { uniform = "2 arcmin" }'
-        )
-    model, _, findings = expected_model(settings)
+    model, findings = model_with_tolerances(settings)
     for symbol in goal:
         if symbol != DRIFT and symbol not in model.symbols:
             raise StudyError(f"goal.{symbol}", "found a term that is not fitted, expected one that is")
@@ -195,6 +190,17 @@ def design_tolerances(
     if best.x is None:
         raise _unreachable(tried, goal, own)
     return ToleranceDesign(best, tuple(tried), own, goal, total(own, size * 0.0 + 1.0), tuple(findings))
+
+
+def model_with_tolerances(settings: TurntableSettings) -> tuple[TableModel, list[Finding]]:
+    """The terms that are to be identified, with remarks; raises `StudyError` without noise or errors of the table."""
+    stated_noise(settings)
+    if not settings.chain.errors:
+        raise StudyError(
+            "rig.errors", 'found none, expected present tolerances such as default = { uniform = "2 arcmin" }'
+        )
+    model, _, findings = expected_model(settings)
+    return model, findings
 
 
 def _plans(settings: TurntableSettings, model: TableModel) -> list[Plan]:
